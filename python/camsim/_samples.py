@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._errors import InputError
+from .frames import frame_number
 from .randomize import Variations
 from .scenario import Scenario
 
@@ -44,7 +45,7 @@ class Samples:
 
     def __getitem__(self, index: Any) -> dict[str, Any]:
         """Arrays by channel, with `sample`, `frame`, `stamp_ns` and, of a variation, `variation` and `drawn`."""
-        number = range(len(self))[int(index)]
+        number = frame_number(index, len(self), "sample")
         variation, place = divmod(number, len(self.frames))
         scenario = self._scenario(variation)
         frame = scenario.render(self.frames[place], self.channels)

@@ -60,8 +60,8 @@ class Source:
 class Frame(Mapping[str, NDArray[Any]]):
     """A finished frame: numpy arrays of its channels, by name and as attributes.
 
-    Arrays are what the renderer has allocated: nothing is copied, each owns its memory, and numpy's
-    ``__dlpack__`` hands it on to other libraries. Images are height x width (x components), row by row from
+    Each array owns the memory that the renderer has filled, without a copy; numpy's ``__dlpack__`` hands it on to
+    other libraries. Images are height x width (x components), row by row from
     the top-left pixel; `docs/CHANNELS.md` says what each channel holds.
 
     >>> frame = scenario[7]
@@ -216,6 +216,12 @@ class Frame(Mapping[str, NDArray[Any]]):
         pixels. Float32, height x width x 4."""
         return self._attribute("blur_path")
 
+    @property
+    def raw(self) -> NDArray[np.uint16]:
+        """Digital numbers of the image sensor, which `camera.sensor` describes. Uint16, height x width: the mosaic; or
+        height x width x 3 of a sensor without one."""
+        return self._attribute("raw")
+
     def save(self, path: str | os.PathLike[str], encoding: str | None = None) -> None:
         """Writes the picture: `.png` in an encoding of `camera.photometric.output` (the scenario's by default),
         `.exr` with linear 32-bit floats.
@@ -224,4 +230,6 @@ class Frame(Mapping[str, NDArray[Any]]):
         """
         if "color" not in self._arrays:
             raise InputError('the frame has no picture to write: ask for it by channels=["color", ...]')
+        if not os.fspath(path).lower().endswith((".png", ".exr")):
+            raise InputError(f"cannot write {os.fspath(path)}: pictures are .png or .exr")
         _camsim.write_picture(path, self.color, encoding or self._encoding)

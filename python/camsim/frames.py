@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -22,6 +23,7 @@ class Frames(Iterator[Frame]):
         twins: Sequence[Mapping[str, Any]],
     ) -> None:
         self._left = len(numbers)
+        self._bar: Any = None
         self._stream = _Stream(native, numbers, channels)
         self._twins: dict[str, _Stream | _Burst] = {}
         for spec in twins:
@@ -32,9 +34,23 @@ class Frames(Iterator[Frame]):
                 pictures = [native.twin(name, instant) for instant in range(instants)]
                 self._twins[name] = _Burst(pictures, numbers, of_twin)
 
+    def with_bar(self) -> Frames:
+        """Shows a bar by tqdm from now on, if that is installed."""
+        try:
+            self._bar = importlib.import_module("tqdm.auto").tqdm(total=self._left, unit="frame")
+        except ImportError:
+            pass
+        return self
+
     def __next__(self) -> Frame:
-        frame = self._stream.next()[0]
+        try:
+            frame = self._stream.next()[0]
+        except BaseException:
+            self._end_bar()
+            raise
         self._left -= 1
+        if self._bar is not None:
+            self._bar.update()
         frame.twins = {name: twin.next() for name, twin in self._twins.items()}
         return frame
 
@@ -47,6 +63,12 @@ class Frames(Iterator[Frame]):
         for stream in (self._stream, *self._twins.values()):
             stream.close()
         self._left = 0
+        self._end_bar()
+
+    def _end_bar(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
 
 
 class _Stream:
@@ -90,10 +112,14 @@ def channel_names(channels: Iterable[str] | None) -> list[str] | None:
     return None if channels is None else list(channels)
 
 
-def with_bar(frames: Frames) -> Iterator[Frame]:
-    """Frames with a bar by tqdm, if that is installed."""
+def frame_number(index: Any, count: int, what: str = "frame") -> int:
+    """The number of one of `count` frames, which may be counted from the end."""
     try:
-        tqdm = importlib.import_module("tqdm.auto").tqdm
-    except ImportError:
-        return frames
-    return iter(tqdm(frames, total=len(frames), unit="frame"))
+        number = operator.index(index)
+    except TypeError:
+        hint = f'; scenario.render(0, ["{index}"]) gives a channel of a frame' if isinstance(index, str) else ""
+        raise TypeError(f"{what}s are numbered by whole numbers, not {type(index).__name__}{hint}") from None
+    if not -count <= number < count:
+        whose = "the scenario has" if what == "frame" else "there are"
+        raise IndexError(f"{what} {number}: {whose} {count} {what}s")
+    return number % count

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import pathlib
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +27,9 @@ class Twist:
     """Constant velocity and angular rate in the camera's own axes (right, down, forwards)."""
 
     velocity_m_s: Sequence[float] = (0.0, 0.0, 0.0)
+    """Right, down, forwards, m/s; three numbers."""
     angular_rate_rad_s: Sequence[float] = (0.0, 0.0, 0.0)
+    """About the axes right, down and forwards, by the right hand, rad/s; three numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +58,10 @@ class Flow:
     """Optical flow of the ideal picture: motion of camera and objects together."""
 
     px: ArrayLike
-    """Displacements right and down within the interval, pixels; shape (height, width, 2)."""
+    """Where the content of each pixel is after the interval, less where it is: pixels, positive to the right and down;
+    shape (height, width, 2)."""
     interval_ms: float
-    """Negative for a flow to the picture before."""
+    """Length of the interval, which begins at the picture's instant; negative for a flow to the picture before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,7 @@ class _SettingsArgument:
     frame: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Applied:
     """A picture of the imperfect camera."""
 
@@ -92,6 +96,10 @@ class Applied:
     """Planar depth in the camera of each row, metres; 0 where nothing is. Height x width."""
     without_source: dict[str, int]
     """Numbers of pixels without a source: `no_ray`, `outside`, `holes`, `unknown_flow`, `torn_flow`."""
+
+    def __repr__(self) -> str:
+        height, width = self.depth.shape
+        return f"<camsim.Applied: {width}x{height}, {sum(self.without_source.values())} pixels without a source>"
 
 
 def apply(
@@ -172,7 +180,10 @@ def _camera(camera: Scenario | Mapping[str, Any] | Path) -> _camsim.Camera:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Differences between two pictures or two folders of them."""
+    """Differences between two pictures or two folders of them, over all values but alpha, in the units of the pictures.
+
+    If a NaN or an infinity of one picture faces another value, `rmse`, `max`, `psnr_db` and `ssim` are NaN.
+    """
 
     rmse: float
     """Root mean square difference."""
@@ -181,11 +192,11 @@ class Comparison:
     psnr_db: float | None
     """Peak signal-to-noise ratio for a peak of 1; None for equal pictures."""
     ssim: float | None
-    """Structural similarity; None below 11 pixels of width or height."""
+    """Structural similarity of luminance, 1 for equal pictures; None below 11 pixels of width or height."""
     differing: float
-    """Share of pixels that differ at all."""
+    """Share of pixels that differ at all, in alpha too; 0 to 1."""
     non_finite: int
-    """Pixels with a NaN or an infinity in either picture; all but `differing` leave them out."""
+    """Number of pixels with a NaN or an infinity in either picture; where both are alike, the figures leave them out."""
     formats: tuple[dict[str, Any], ...] = ()
     """The same of all files of each `format` of two folders: EXR has linear values and PNG encoded ones."""
     files: tuple[dict[str, Any], ...] = ()
@@ -206,12 +217,19 @@ def compare(a: ArrayLike | Path, b: ArrayLike | Path) -> Comparison:
     """
     if isinstance(a, (str, os.PathLike)) and isinstance(b, (str, os.PathLike)):
         report: dict[str, Any] = json.loads(_command.output(["compare", a, b, "--json"]))
-        report.update({name: tuple(report[name]) for name in ("formats", "files", "only_in_a", "only_in_b")})
-        return Comparison(**report)
+        report.update({name: tuple(map(_told, report[name])) for name in ("formats", "files")})
+        report.update({name: tuple(report[name]) for name in ("only_in_a", "only_in_b")})
+        return Comparison(**_told(report))
     if isinstance(a, (str, os.PathLike)) or isinstance(b, (str, os.PathLike)):
         raise InputError("compare two files or folders, or two arrays")
-    figures: dict[str, Any] = json.loads(_camsim.compare(picture_of(a, "a"), picture_of(b, "b")))
-    return Comparison(**figures)
+    return Comparison(**_told(json.loads(_camsim.compare(picture_of(a, "a"), picture_of(b, "b")))))
+
+
+def _told(figures: dict[str, Any]) -> dict[str, Any]:
+    """Figures with NaN where JSON has null for it."""
+    if figures["rmse"] is None:
+        figures.update(rmse=math.nan, max=math.nan, psnr_db=math.nan, ssim=math.nan)
+    return figures
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,10 +274,10 @@ def _plain(tree: Any) -> Any:
     return tree.tolist() if hasattr(tree, "tolist") else tree
 
 
-def verify(scenario: Scenario, frames: Sequence[int] | None = None, *, pictures: bool = False) -> dict[str, Any]:
+def verify(scenario: Scenario, frames: int | Sequence[int] | None = None, *, pictures: bool = False) -> dict[str, Any]:
     """Measures errors against the reference renderer, which traces exact rays: slow. See `camsim verify --json`.
 
-    :param frames: Their numbers; five, evenly spread, if left out.
+    :param frames: A number, or several; five, evenly spread, if left out.
     :param pictures: Measure the error of the pictures, too.
     :returns: `kept` says whether all tolerances are; `frames` has the figures of each.
 
@@ -267,7 +285,12 @@ def verify(scenario: Scenario, frames: Sequence[int] | None = None, *, pictures:
     True
     """
     words = ["verify", "{scenario}", "--json"]
-    words += [] if frames is None else ["--frames", ",".join(str(range(len(scenario))[frame]) for frame in frames)]
+    if frames is not None:
+        wanted = frames if isinstance(frames, Iterable) and not isinstance(frames, str) else [frames]
+        numbers = [str(scenario._number(frame)) for frame in wanted]
+        if not numbers:
+            raise InputError("verify: frames is empty: give numbers of frames, or leave it out")
+        words += ["--frames", ",".join(numbers)]
     words += ["--pictures"] if pictures else []
     report: dict[str, Any] = json.loads(scenario._command(words, fails_with_output=True))
     return report

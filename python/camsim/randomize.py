@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
@@ -116,8 +117,14 @@ class Piece(Distribution):
         return {"piece_s": self.length_s}
 
 
+_CHECKED = 10_000
+"""Variations that iteration checks before it gives the first."""
+
+
 class Variations(Sequence["Scenario"]):
     """The scenarios that `[randomize]` describes, by number. Any of them can be made at any time, in any process.
+
+    Iteration checks all of them before it gives the first, of more than 10 000 the first 10 000; `check` checks others.
 
     >>> variations = camsim.randomize(scenario, {"camera.shutter.exposure_ms": camsim.Uniform(2, 10)}, seed=7)
     >>> variations[17][0].color
@@ -152,7 +159,22 @@ class Variations(Sequence["Scenario"]):
         return self.scenario._variation(self._number(index))
 
     def __iter__(self) -> Iterator[Scenario]:
+        self.check(0, min(len(self), _CHECKED))
         return (self.scenario._variation(number) for number in range(len(self)))
+
+    def check(self, start: int = 0, stop: int | None = None) -> None:
+        """Checks variations from `start` to before `stop`, all if left out. Nothing is loaded or rendered: some
+        thousands take a second.
+
+        :raises camsim.InputError: A drawn value is out of range; the message has number, key and value.
+
+        >>> variations.check()
+        """
+        native = self.scenario._native
+        is_endless = native.variations is None and stop is not None
+        numbers = range(start, stop or 0) if is_endless else range(len(self))[start:stop]
+        if len(numbers):
+            native.check_variations(numbers.start, numbers.stop)
 
     def drawn(self, index: SupportsIndex) -> dict[str, Any]:
         """What variation `index` draws, by key; nothing is loaded."""
@@ -160,11 +182,18 @@ class Variations(Sequence["Scenario"]):
         return values
 
     def _number(self, index: SupportsIndex) -> int:
-        number, count = index.__index__(), self.scenario._native.variations
+        try:
+            number, count = operator.index(index), self.scenario._native.variations
+        except TypeError:
+            raise TypeError(f"variations are numbered by whole numbers, not {type(index).__name__}") from None
         if count is not None:
-            return range(count)[number]
+            if not -count <= number < count:
+                raise IndexError(f"variation {number}: there are {count} variations")
+            return number % count
         if number < 0:
             raise IndexError("variations without a count have no end to count from")
+        if number >= 2**63:
+            raise IndexError(f"variation {number}: variations have numbers of 63 bits")
         return number
 
     def __repr__(self) -> str:
@@ -190,7 +219,8 @@ def randomize(
     :param seed: Of the draws; the scenario's if left out.
     :param count: How many variations there are; any number if left out.
     :param own_seed: Give each variation a seed of its own, so that its noise differs.
-    :raises camsim.InputError: A key or a distribution does not fit.
+    :raises camsim.InputError: A key or a distribution does not fit. Drawn values are checked by `Variations.check`, which
+        iteration begins with.
 
     >>> variations = camsim.randomize(
     ...     scenario,

@@ -15,8 +15,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-import ray.data
 from numpy.typing import NDArray
+
+try:
+    import ray.data
+except ImportError as error:
+    raise ImportError("camsim.ray needs Ray Data: pip install camsim[ray]") from error
 
 from ._samples import Samples, stacked
 from .randomize import Variations

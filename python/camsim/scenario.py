@@ -8,12 +8,12 @@ import pathlib
 import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, overload
+from typing import Any, SupportsIndex, overload
 
 from . import _camsim, _command, _toml
 from ._errors import ScenarioWarning
 from .frame import Frame
-from .frames import Frames, channel_names, with_bar
+from .frames import Frames, channel_names, frame_number
 from .inputs import InputFiles
 from .lens import Lens
 from .randomize import Variations
@@ -34,8 +34,10 @@ class Scenario(Sequence[Frame]):
     ...     print(frame.index, frame.stamp_ns, float(frame.depth.max()))
     """
 
-    def __init__(self, native: _camsim.Scenario, files: InputFiles, known: Iterable[str] = ()) -> None:
+    def __init__(self, native: _camsim.Scenario = None, files: InputFiles = None, known: Iterable[str] = ()) -> None:  # type: ignore[assignment]
         """Not for users: `Scenario.load` and `Scenario.from_dict` make scenarios."""
+        if not isinstance(native, _camsim.Scenario):
+            raise TypeError("use Scenario.load(path), Scenario.from_dict(tree) or Scenario.demo() to make a scenario")
         self._native = native
         self._files = files
         self._twin_of: tuple[Scenario, str, int | None] | None = None
@@ -86,9 +88,12 @@ class Scenario(Sequence[Frame]):
         >>> scenario = Scenario.from_dict({
         ...     "flight": {"log": "flight.csv"},
         ...     "camera": {"size_px": [640, 480], "focal_px": [420.0, 420.0], "fps": 30.0},
-        ...     "scene": {"pattern": {"cell_m": 10.0}},
+        ...     "scene": {"pattern": {"image": "ground.png", "width_m": 100.0}},
         ... })
         """
+        if not isinstance(tree, Mapping):
+            hint = "; Scenario.load reads files" if isinstance(tree, (str, os.PathLike)) else ""
+            raise TypeError(f"from_dict takes a dict of keys, not {type(tree).__name__}{hint}")
         files = InputFiles()
         text = _toml.document_text(files.placed(tree))
         return cls(_camsim.Scenario.parse(text, pathlib.Path(folder) / "<dict>", camera, backend), files)
@@ -116,14 +121,21 @@ class Scenario(Sequence[Frame]):
         """Changes a key of this scenario. Frames under way are not changed.
 
         :param key: With dots, as in the file; elements of lists by number, cameras of `[[cameras]]` by name.
+        :param value: Of a table the keys that change: the others of the table stay. Lists and values are replaced.
+            None takes a key or a whole table out, so that its default holds.
         :raises camsim.InputError: There is no such key, or the value cannot be used; nothing is changed then.
 
         >>> scenario.set("camera.shutter.readout_ms", 20)
         """
-        self._native.set(key, self._files.text(value, key))
+        native = self._native.changed(_set_pairs({key: value}, self._files))
+        self._native.take(native)
 
     def replace(self, sets: Mapping[str, Any]) -> Scenario:
         """A copy with changed keys. What they do not touch (log, scene) is shared, and loaded once.
+
+        Tables are merged key by key, so ``{"camera": {"fps": 10}}`` is ``{"camera.fps": 10}`` and leaves the rest of
+        the camera as it is; lists and values are replaced. None takes a key or a whole table out:
+        ``{"camera.sensor": None}`` is a camera without one.
 
         >>> sharp = scenario.replace({"camera.shutter.exposure_ms": 0, "camera.shutter.readout_ms": 0})
         """
@@ -190,7 +202,7 @@ class Scenario(Sequence[Frame]):
 
     @property
     def warnings(self) -> list[str]:
-        """What camsim has noticed while loading."""
+        """What looks like a mistake in the scenario, and what camsim reads otherwise than it is written."""
         return self._native.warnings()
 
     @property
@@ -247,7 +259,7 @@ class Scenario(Sequence[Frame]):
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
         """Renders one frame, or those of a slice, with the channels of `output.channels`."""
         if isinstance(index, slice):
-            return list(self._frames(range(len(self))[index], None))
+            return list(self._frames(self._numbers(index), None))
         return self.render(index)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -260,7 +272,7 @@ class Scenario(Sequence[Frame]):
         :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
         :raises IndexError: There is no such frame.
         """
-        number = range(len(self))[index]
+        number = self._number(index)
         native = self._native
         return Frame(native.render_one(number, channel_names(channels)), native.camera, native.encoding)
 
@@ -273,7 +285,7 @@ class Scenario(Sequence[Frame]):
         channels: Iterable[str] | None = None,
         twins: bool = False,
         progress: bool = False,
-    ) -> Iterator[Frame]:
+    ) -> Frames:
         """Renders frames in order; while Python works on one, the next ones are under way.
 
         :param start, stop, step: As those of a slice of this scenario.
@@ -285,8 +297,18 @@ class Scenario(Sequence[Frame]):
         >>> for frame in scenario.frames(0, 100, channels=["color", "flow"]):
         ...     train(frame.color, frame.flow)
         """
-        frames = self._frames(range(len(self))[start:stop:step], channel_names(channels), twins)
-        return with_bar(frames) if progress else frames
+        frames = self._frames(self._numbers(slice(start, stop, step)), channel_names(channels), twins)
+        return frames.with_bar() if progress else frames
+
+    def _number(self, index: SupportsIndex) -> int:
+        """The number of a frame, which may be counted from the end."""
+        return frame_number(index, len(self))
+
+    def _numbers(self, wanted: slice) -> range:
+        try:
+            return range(len(self))[wanted]
+        except TypeError:
+            raise TypeError("start, stop and step are whole numbers of frames, or None") from None
 
     def _frames(self, numbers: range, channels: list[str] | None, twins: bool = False) -> Frames:
         return Frames(self._native, numbers, channels, self._twin_specs() if twins else [])
@@ -299,7 +321,7 @@ class Scenario(Sequence[Frame]):
         >>> print(scenario.explain(7))
         >>> scenario.explain(7, as_dict=True)["plan"]
         """
-        number = range(len(self))[frame]
+        number = self._number(frame)
         words = ["explain", "{scenario}", "--frame", str(number), *(["--json"] if as_dict else [])]
         text = self._command(words)
         return json.loads(text) if as_dict else text
@@ -342,7 +364,27 @@ def default_scenario() -> str:
 
 
 def _set_pairs(sets: Mapping[str, Any], files: InputFiles) -> list[tuple[str, str]]:
-    return [(key, files.text(value, key)) for key, value in sets.items()]
+    if not isinstance(sets, Mapping):
+        raise TypeError(f'sets: a dict is needed, {{"camera.fps": 10}}, not {type(sets).__name__}')
+    pairs: list[tuple[str, str]] = []
+    for key, value in sets.items():
+        if not isinstance(key, str):
+            raise TypeError(f"keys of a scenario are text, not {type(key).__name__}: {key!r}")
+        _add_pairs(pairs, key, value, files)
+    return pairs
+
+
+def _add_pairs(pairs: list[tuple[str, str]], key: str, value: Any, files: InputFiles) -> None:
+    """Adds what `--set` says for a value: of a table each of its keys, so that its others stay."""
+    is_law = key.split(".")[0] == "randomize"
+    if value is None:
+        pairs.append((key, _camsim.UNSET))
+    elif isinstance(value, Mapping) and value and not is_law:
+        for name, item in value.items():
+            _toml.key_text(name)
+            _add_pairs(pairs, f"{key}.{name}", item, files)
+    else:
+        pairs.append((key, files.text(value, key)))
 
 
 def _restored(text: str, camera: str | None, backend: str, folder: str, contents: Mapping[str, bytes]) -> Scenario:

@@ -17,8 +17,12 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
+
+try:
+    import torch
+except ImportError as error:
+    raise ImportError("camsim.torch needs PyTorch: pip install camsim[torch]") from error
 
 from ._samples import Samples
 from .randomize import Variations

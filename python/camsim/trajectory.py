@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _camsim
+from ._arrays import numbers_of
+from ._errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,8 @@ class CameraStates:
 class Trajectory:
     """The flown motion at any instant, exactly: the log after cleaning, speed factor and tracker.
 
-    Beyond the log the platform flies on at its last velocity and rate.
+    Beyond the log (`span_s`) the platform flies on at its last velocity and rate, however far: compare times with
+    `span_s` if that is not wanted. An instant that is NaN or infinite gives NaN in every field.
 
     >>> trajectory = scenario.trajectory
     >>> trajectory.at(12.5).velocity_ned_m_s
@@ -82,18 +85,40 @@ class Trajectory:
         return _states(CameraStates, self._native.camera_at, self._path_s_of_ns(t_ns), np.ndim(t_ns))
 
     def _path_s(self, t_s: ArrayLike) -> NDArray[np.float64]:
-        return np.atleast_1d(np.asarray(t_s, dtype=np.float64)) - self._native.epoch_ns * 1e-9
+        return _row(numbers_of(t_s, "t_s"), "t_s") - self._native.epoch_ns * 1e-9
 
     def _path_s_of_ns(self, t_ns: ArrayLike) -> NDArray[np.float64]:
-        since_ns: NDArray[np.int64] = np.atleast_1d(np.asarray(t_ns, dtype=np.int64)) - self._native.epoch_ns
+        stamps: NDArray[Any] = np.asarray(t_ns)
+        # Python's own numbers beyond 64 bits are objects.
+        whole = numbers_of(t_ns, "t_ns") if stamps.dtype.kind in "buf" else stamps
+        is_whole = whole.dtype.kind == "i" or whole.dtype.kind == "f" and bool(np.all(np.floor(whole) == whole))
+        if not is_whole or (np.abs(whole.astype(np.float64)) >= 2.0**63).any():
+            raise InputError("t_ns: whole nanoseconds of 64 bits are needed; at and camera_at take seconds")
+        since_ns: NDArray[np.int64] = _row(whole, "t_ns").astype(np.int64) - self._native.epoch_ns
         return since_ns.astype(np.float64) * 1e-9
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError("a trajectory cannot be pickled: pickle its scenario, and ask that for .trajectory")
+
+    def __repr__(self) -> str:
+        first_s, last_s = self.span_s
+        return f"<camsim.Trajectory: {first_s:.3f} s to {last_s:.3f} s>"
+
+
+def _row(instants: NDArray[Any], what: str) -> NDArray[Any]:
+    if instants.ndim > 1:
+        raise InputError(f"{what}: a number or an array of shape (N,) is needed, not {instants.shape}")
+    return np.atleast_1d(instants)
 
 
 _States = TypeVar("_States", BodyStates, CameraStates)
 
 
 def _states(kind: type[_States], native: Any, path_s: NDArray[np.float64], dimensions: int) -> _States:
-    columns: dict[str, Any] = native(np.ascontiguousarray(path_s))
+    is_told = np.isfinite(path_s)
+    columns: dict[str, Any] = native(np.ascontiguousarray(np.where(is_told, path_s, 0.0)))
+    for values in columns.values():
+        values[~is_told] = np.nan
     if dimensions == 0:
         columns = {name: values[0] for name, values in columns.items()}
     return kind(**columns)
@@ -103,8 +128,12 @@ class _Samples:
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
 
+    def __repr__(self) -> str:
+        names = ", ".join(field.name for field in fields(self))  # type: ignore[arg-type]
+        return f"<camsim.{type(self).__name__}: {len(self)} samples of {names}>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ImuSamples(_Samples):
     """Samples of an inertial unit in its own axes, as its table `sensors/NAME.csv`; N of each."""
 
@@ -134,7 +163,7 @@ class ImuSamples(_Samples):
     """Whether an axis is at the end of its range."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GnssSamples(_Samples):
     """Samples of a satellite receiver; NaN is measured where there is no fix."""
 
@@ -166,7 +195,7 @@ class GnssSamples(_Samples):
     """Shape (N, 3)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BarometerSamples(_Samples):
     """Samples of a barometer; shape (N,) each."""
 
@@ -183,7 +212,7 @@ class BarometerSamples(_Samples):
     bias_pa: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MagnetometerSamples(_Samples):
     """Samples of a magnetometer in its own axes, microtesla."""
 

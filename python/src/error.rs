@@ -13,7 +13,14 @@ pyo3::import_exception!(camsim._errors, RunError);
 /// The exception of a failure.
 pub fn raise(failure: &Failure) -> PyErr {
     let text = failure.to_string();
-    let message = text.strip_prefix("error: ").unwrap_or(&text).to_owned();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    // What the command line calls `--set` is a key of `set`, `replace` or `sets` in Python.
+    let message = text
+        .strip_prefix("--set ")
+        .unwrap_or(text)
+        .replace("\n--set ", "\n")
+        .replace("write --set ", "write ")
+        .replace("`camsim render --print-default`", "camsim.default_scenario()");
     match failure.code() {
         failure::BAD_INPUT => InputError::new_err(message),
         failure::NO_ADAPTER => AdapterError::new_err(message),

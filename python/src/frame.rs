@@ -86,6 +86,9 @@ fn arrays<'py>(py: Python<'py>, frame: RenderedFrame, channels: &[Channel]) -> P
     if let Some(coords) = frame.coords.filter(|_| has(Channel::Coords)) {
         dict.set_item("coords", table_image::<_, COORDS_CHANNELS>(py, coords, [height, width])?)?;
     }
+    if let Some(raw) = frame.raw.filter(|_| has(Channel::Raw)) {
+        dict.set_item("raw", image(py, raw.values, [height, width])?)?;
+    }
     for plane in frame.planes.into_iter().filter(|plane| has(plane.channel)) {
         let array = match plane.values {
             PlaneValues::Float(values) => image(py, values, [height, width])?,

@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use camsim::core::{
     camera::{BulkInverse, CameraModel},
+    lens::foreign_model,
     scenario::{CameraSpec, LensModel},
 };
 use glam::{DVec2, DVec3};
@@ -49,6 +50,15 @@ impl Lens {
     }
 }
 
+/// The exception of a model that is not known, or by another program's name.
+fn wrong_model(name: &str, error: &toml::de::Error) -> PyErr {
+    let known = foreign_model(name).and_then(|model| toml::Value::try_from(model).ok());
+    input_error(match known {
+        Some(model) => format!("model {name:?}: write {model}, its name here"),
+        None => format!("model {name:?}: {}", error.message().trim_end()),
+    })
+}
+
 /// Maps all rows, a batch at a time, on all processors.
 fn map_batches<const N: usize, const M: usize>(
     points: &[[f64; N]],
@@ -86,9 +96,8 @@ impl Lens {
         model: &str,
         coefficients: Vec<f64>,
     ) -> PyResult<Self> {
-        let model: LensModel = toml::Value::String(model.to_owned())
-            .try_into()
-            .map_err(|error: toml::de::Error| input_error(format!("model {model:?}: {}", error.message())))?;
+        let named = toml::Value::String(model.to_owned()).try_into();
+        let model: LensModel = named.map_err(|error| wrong_model(model, &error))?;
         let camera = CameraModel::new(size_px, focal_px, principal_point_px, model, &coefficients);
         Ok(Self::of_camera(camera.or_input_error()?))
     }
@@ -117,6 +126,20 @@ impl Lens {
     #[getter]
     fn coefficients(&self) -> Vec<f64> {
         self.camera.lens.coefficients().to_vec()
+    }
+
+    /// Whether the lens has the same numbers and the same tables.
+    fn equals(&self, other: &Self) -> bool {
+        self.camera == other.camera
+    }
+
+    /// Whether model and coefficients say all of it.
+    #[getter]
+    fn is_plain(&self) -> bool {
+        let (size_px, focal_px) = (self.camera.size_px, self.camera.focal_px.into());
+        let (lens, centre_px) = (&self.camera.lens, self.camera.principal_point_px.into());
+        CameraModel::new(size_px, focal_px, Some(centre_px), lens.model(), lens.coefficients())
+            .is_ok_and(|plain| plain == self.camera)
     }
 
     /// Pixels of points in camera axes; NaN beside and behind the camera, but for what the lens images there.

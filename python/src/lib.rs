@@ -51,6 +51,7 @@ mod _camsim {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("UNSET", camsim::io::scenario_file::UNSET)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

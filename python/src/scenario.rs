@@ -30,6 +30,9 @@ use crate::{
     trajectory::Trajectory,
 };
 
+const NO_SENSOR: &str =
+    "channels: \"raw\" holds the digital numbers of an image sensor; add [camera.sensor], or leave it out";
+
 /// A checked scenario of one camera, with the cameras beside it.
 #[derive(Clone)]
 struct State {
@@ -106,6 +109,9 @@ impl Scenario {
             None => sequence.scenario.output.channels.clone(),
             Some(names) => names.iter().map(|name| channel(name)).collect::<PyResult<_>>()?,
         };
+        if channels.contains(&Channel::Raw) && sequence.scenario.camera.sensor.is_none() {
+            return Err(input_error(NO_SENSOR));
+        }
         let renderer = self.snapshot().source.renderer.of_sequence(&sequence);
         Ok(SessionKey { renderer, sequence, channels })
     }
@@ -212,11 +218,16 @@ impl Scenario {
         Ok(serde_json::Value::Object(values).to_string())
     }
 
-    /// Changes a key of this scenario.
-    fn set(&self, py: Python<'_>, key: String, value: String) -> PyResult<()> {
-        let changed = self.changed(py, vec![(key, value)])?;
+    /// Checks variations, from `first` to before `end`.
+    fn check_variations(&self, py: Python<'_>, first: u64, end: u64) -> PyResult<()> {
+        let source = self.snapshot().source;
+        let indices: Vec<u64> = (first..end).collect();
+        py.detach(|| in_own_pool(|| source.random()?.check(&indices))).or_input_error()
+    }
+
+    /// Becomes a changed scenario.
+    fn take(&self, py: Python<'_>, changed: &Self) {
         py.detach(|| *lock(&self.state) = changed.snapshot());
-        Ok(())
     }
 
     /// The same scenario of another of its cameras.
