@@ -109,7 +109,14 @@ def channel_names(channels: Iterable[str] | None) -> list[str] | None:
     """A list of names, if there is one."""
     if isinstance(channels, str):
         raise InputError(f'channels: write channels=["{channels}"], a list of names')
-    return None if channels is None else list(channels)
+    try:
+        names = None if channels is None else list(channels)
+    except TypeError:
+        raise TypeError(f'channels: write a list of names, ["color", "depth"], not {type(channels).__name__}') from None
+    for name in names or ():
+        if not isinstance(name, str):
+            raise TypeError(f"channels: names are text, not {type(name).__name__}: {name!r}")
+    return names
 
 
 def frame_number(index: Any, count: int, what: str = "frame") -> int:

@@ -35,7 +35,8 @@ class PoseTable:
 
     >>> t_s = np.linspace(0, 10, 101)
     >>> log = camsim.PoseTable(t_s, position_ned_m=np.c_[20 * t_s, 0 * t_s, 0 * t_s - 100])
-    >>> scenario = camsim.Scenario.from_dict({"flight": {"log": log, "attitude": "track"}, ...})
+    >>> ground = {"pattern": {"image": np.full((8, 8, 3), 128, dtype=np.uint8), "width_m": 100}}
+    >>> scenario = camsim.Scenario.from_dict({"flight": {"log": log, "attitude": "track"}, "scene": ground})
     """
 
     t_s: ArrayLike

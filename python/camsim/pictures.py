@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _camsim, _command, _toml
-from ._arrays import linear_of, picture_of, rows_of
+from ._arrays import linear_of, numbers_of, pair_of, picture_of, rows_of
 from ._errors import InputError
 from .scenario import Scenario
 
@@ -145,11 +145,17 @@ def apply(
         if px.ndim != 3 or px.shape[2] != 2:
             raise InputError(f"motion.px: a flow of shape (height, width, 2) is needed, not {px.shape}")
         native_motion: Any = _FlowArgument(px, float(motion.interval_ms))
-    else:
+    elif isinstance(motion, (Twist, Poses)):
         native_motion = motion
+    else:
+        raise TypeError(f"motion: a camsim.Twist, camsim.Poses or camsim.Flow is needed, not {type(motion).__name__}")
+    if depth is not None:
+        depth = numbers_of(depth, "depth")
+        if depth.ndim != 2:
+            raise InputError(f"depth: an array of shape (height, width) is needed, not {depth.shape}")
     about = _FrameArgument(
-        list(map(float, focal_px)),
-        None if principal_point_px is None else list(map(float, principal_point_px)),
+        pair_of(focal_px, "focal_px", "fx, fy"),
+        None if principal_point_px is None else pair_of(principal_point_px, "principal_point_px", "cx, cy"),
         float(instant_ms),
         holes == "mark",
     )

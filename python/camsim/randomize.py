@@ -229,6 +229,8 @@ def randomize(
     ...     count=1000,
     ... )
     """
+    if not isinstance(laws, Mapping):
+        raise TypeError(f'laws: a dict is needed, {{"camera.fps": camsim.Uniform(10, 30)}}, not {type(laws).__name__}')
     sets: dict[str, Any] = {
         f"randomize.{key}": law.to_dict() if isinstance(law, Distribution) else law for key, law in laws.items()
     }

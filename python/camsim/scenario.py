@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, SupportsIndex, overload
 
 from . import _camsim, _command, _toml
-from ._errors import ScenarioWarning
+from ._errors import InputError, ScenarioWarning
 from .frame import Frame
 from .frames import Frames, channel_names, frame_number
 from .inputs import InputFiles
@@ -67,6 +67,8 @@ class Scenario(Sequence[Frame]):
 
         >>> scenario = Scenario.load("flight.toml", sets={"camera.shutter.readout_ms": 0})
         """
+        if isinstance(path, Mapping):
+            raise TypeError("load takes the path of a file; Scenario.from_dict takes a dict of keys")
         files = InputFiles()
         return cls(_camsim.Scenario.load(path, _set_pairs(sets or {}, files), preset, camera, backend), files)
 
@@ -376,7 +378,9 @@ def _set_pairs(sets: Mapping[str, Any], files: InputFiles) -> list[tuple[str, st
 
 def _add_pairs(pairs: list[tuple[str, str]], key: str, value: Any, files: InputFiles) -> None:
     """Adds what `--set` says for a value: of a table each of its keys, so that its others stay."""
-    is_law = key.split(".")[0] == "randomize"
+    is_law = key.startswith("randomize.")
+    if value is None and key == "randomize":
+        raise InputError("randomize: take its keys out one by one, {\"randomize.camera.fps\": None}, or use a scenario without it")
     if value is None:
         pairs.append((key, _camsim.UNSET))
     elif isinstance(value, Mapping) and value and not is_law:

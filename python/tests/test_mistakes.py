@@ -124,6 +124,8 @@ def test_tables_are_merged() -> None:
     scenario.set("camera.shutter", None)
     assert scenario.to_dict()["camera"]["shutter"]["readout_ms"] == 0
     sensor = scenario.replace({"camera": {"sensor": {"white_e": 1000}, "photometric": {"noise_sigma": None}}})
+    law = {"camera.shutter.exposure_ms": {"uniform": [2, 10]}}
+    assert 2 <= scenario.replace({"randomize": law}).variations.drawn(3)["camera.shutter.exposure_ms"] <= 10
     assert "sensor" in sensor.to_dict()["camera"]
     assert "sensor" not in sensor.replace({"camera": {"sensor": None}}).to_dict()["camera"]
 
@@ -176,6 +178,13 @@ def mistakes() -> list[tuple[Callable[[], Any], type[Exception], str]]:
         (lambda: scenario.set(5, 5), TypeError, "keys of a scenario are text"),  # type: ignore[arg-type]
         (lambda: scenario.set("camera.fps", "fast"), camsim.InputError, r'^camera\.fps="fast": camera\.fps: '),
         (lambda: scenario.set("qqqq", 5), camsim.InputError, r"camsim\.default_scenario\(\)"),
+        (lambda: scenario.render(0, [1]), TypeError, "^channels: names are text"),  # type: ignore[list-item]
+        (lambda: camsim.Scenario.load({}), TypeError, "from_dict takes a dict"),  # type: ignore[arg-type]
+        (lambda: camsim.randomize(scenario, [1]), TypeError, "^laws: a dict"),  # type: ignore[arg-type]
+        (lambda: scenario.replace({"randomize": None}), camsim.InputError, "one by one"),
+        (lambda: camsim.apply(scenario, rows, focal_px=50), camsim.InputError, "^focal_px: two numbers"),  # type: ignore[arg-type]
+        (lambda: camsim.apply(scenario, rows, np.zeros(5), focal_px=[50, 50]), camsim.InputError, "^depth: .*height, width"),
+        (lambda: camsim.apply(scenario, rows, motion=3, focal_px=[50, 50]), TypeError, "^motion: a camsim.Twist"),  # type: ignore[arg-type]
         (lambda: scenario[0].save("x.jpg"), camsim.InputError, r"x\.jpg: pictures are \.png or \.exr"),
         (lambda: camsim.Lens((-640, 480), (420, 420)), camsim.InputError, "^size_px: two whole numbers above 0"),
         (lambda: camsim.Lens((640, 480), 420), camsim.InputError, r"^focal_px: two numbers are needed, \(fx, fy\)"),  # type: ignore[arg-type]
