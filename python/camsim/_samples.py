@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._errors import InputError
-from .frames import frame_number
+from .frames import channel_names, frame_number
 from .randomize import Variations
 from .scenario import Scenario
 
@@ -27,11 +26,12 @@ class Samples:
         channels: Iterable[str] | None,
         frames: Iterable[int] | None,
     ) -> None:
-        if isinstance(channels, str):
-            raise InputError(f'channels: write channels=["{channels}"], a list of names')
+        if isinstance(frames, int):
+            raise TypeError(f"frames: write frames=[{frames}], a list of numbers")
+        names = channel_names(channels)
         self.source = source
         base = source.scenario if isinstance(source, Variations) else source
-        self.channels = list(base.channels if channels is None else channels)
+        self.channels = base.channels if names is None else names
         self._held: tuple[int, Scenario] | None = None
         if isinstance(source, Variations):
             self.frames = [0] if frames is None else [int(frame) for frame in frames]

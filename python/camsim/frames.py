@@ -58,8 +58,11 @@ class Frames(Iterator[Frame]):
         """Number of frames that are still to come."""
         return self._left
 
+    def __repr__(self) -> str:
+        return f"<camsim.Frames: {self._left} frames to come>"
+
     def close(self) -> None:
-        """Renders no more than the frames under way."""
+        """Lets the frames under way finish, and renders no more."""
         for stream in (self._stream, *self._twins.values()):
             stream.close()
         self._left = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import pathlib
 import pickle
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 import camsim
+from camsim._samples import Samples
 from conftest import ROOT, SMALL, run_program
 
 T_S = np.linspace(0, 4, 41)
@@ -114,6 +116,18 @@ def test_pictures_with_nan_have_no_figures() -> None:
     assert (alike.rmse, alike.non_finite, alike.psnr_db) == (0, 1, None)
 
 
+def test_files_with_nan_have_no_figures(tmp_path: pathlib.Path) -> None:
+    frame = camsim.Scenario.demo().replace(SMALL)[0]
+    paths = [tmp_path / "one.exr", tmp_path / "other.exr"]
+    frame.save(paths[0])
+    frame.color[3, 4, 1] = math.nan
+    frame.save(paths[1])
+    assert json.loads(run_program("compare", *paths, "--json"))["rmse"] is None
+    assert "NaN" in run_program("compare", *paths, "--quiet")
+    told = camsim.compare(*paths)
+    assert math.isnan(told.rmse) and math.isnan(told.max) and told.non_finite == 1
+
+
 def test_tables_are_merged() -> None:
     scenario = camsim.Scenario.demo()
     before = scenario.to_dict()["camera"]
@@ -179,6 +193,7 @@ def mistakes() -> list[tuple[Callable[[], Any], type[Exception], str]]:
         (lambda: scenario.set("camera.fps", "fast"), camsim.InputError, r'^camera\.fps="fast": camera\.fps: '),
         (lambda: scenario.set("qqqq", 5), camsim.InputError, r"camsim\.default_scenario\(\)"),
         (lambda: scenario.render(0, [1]), TypeError, "^channels: names are text"),  # type: ignore[list-item]
+        (lambda: Samples(scenario, ["color"], 5), TypeError, r"^frames: write frames=\[5\]"),  # type: ignore[arg-type]
         (lambda: camsim.Scenario.load({}), TypeError, "from_dict takes a dict"),  # type: ignore[arg-type]
         (lambda: camsim.randomize(scenario, [1]), TypeError, "^laws: a dict"),  # type: ignore[arg-type]
         (lambda: scenario.replace({"randomize": None}), camsim.InputError, "one by one"),
