@@ -140,7 +140,9 @@ mod tests {
 
     #[test]
     fn a_value_that_the_model_is_not_defined_for_is_named_with_its_range() {
-        use LensModel::{BrownConradyPrism, Division, DoubleSphere, Eucm, FTheta, FThetaInverse, Fov, Mei, Ucm};
+        use LensModel::{
+            BrownConradyPrism, Division, DoubleSphere, Eucm, FTheta, FThetaInverse, Fov, Mei, Ucm,
+        };
         let tilted = |tau_x: f64, tau_y: f64| [[0.0; 12].as_slice(), &[tau_x, tau_y]].concat();
         let cases: [(LensModel, Vec<f64>, &str); 17] = [
             (Eucm, vec![0.6, -1.0], "has beta = -1; beta must be above 0"),
