@@ -183,6 +183,7 @@ fn what_a_format_has_no_place_for_is_named() {
     spec.chromatic = Some(ChromaticSpec { red_scale: vec![1.001], ..ChromaticSpec::default() });
     spec.image_circle = Some(ImageCircleSpec { radius_px: Some(300.0), ..ImageCircleSpec::default() });
     let set = [
+        "name",
         "fps",
         "phase",
         "shutter.exposure_ms",
