@@ -246,7 +246,8 @@ fn lost(spec: &CameraSpec, i: usize, format: CalibrationFormat) -> Result<Vec<St
     let own = leaves(&table(spec)?);
     let differs = own.iter().filter(|leaf| !default.contains(leaf));
     Ok(differs
-        .filter(|(key, _)| !format.holds(spec, key) && !(key == "name" && format.numbers_as(&spec.name, i)))
+        .filter(|(key, _)| !format.holds(spec, key))
+        .filter(|(key, _)| key != "name" || !format.numbers_as(&spec.name, i))
         .map(|(key, value)| format!("{key} = {value}"))
         .collect())
 }
