@@ -36,7 +36,7 @@ const RANGES: [Range; 10] = [
     open(range(LensModel::DoubleSphere, 0, [-1.0, f64::INFINITY], "above -1")),
     range(LensModel::DoubleSphere, 1, [0.0, 1.0], "0 to 1; the order is xi alpha"),
     range(LensModel::Ucm, 0, [0.0, 1.0], "0 to 1; xi of model \"mei\" is alpha / (1 - alpha)"),
-    range(LensModel::Mei, 0, [0.0, f64::INFINITY], "0 or more"),
+    open(range(LensModel::Mei, 0, [-1.0, f64::INFINITY], "above -1; a pinhole has 0")),
     open(range(LensModel::Fov, 0, [-PI, PI], "below pi: it is the field of view in radians")),
     range(
         LensModel::Division,
@@ -152,7 +152,7 @@ mod tests {
             (DoubleSphere, vec![-1.0, 0.5], "has xi = -1; xi must be above -1"),
             (DoubleSphere, vec![-0.2], "has 1 value where 2 are needed; the order is xi alpha"),
             (Ucm, vec![1.2], "has alpha = 1.2; alpha must be 0 to 1"),
-            (Mei, vec![-2.0, 0.1], "has xi = -2; xi must be 0 or more"),
+            (Mei, vec![-2.0, 0.1], "has xi = -2; xi must be above -1"),
             (Fov, vec![53.0], "has omega = 53; omega must be below pi: it is the field of view in radians"),
             (Division, vec![300.0], "has k = 300; k must be -100 to 100"),
             (BrownConradyPrism, tilted(2.0, 1.0), "has tau_x = 2; tau_x must be -pi/4 to pi/4"),
