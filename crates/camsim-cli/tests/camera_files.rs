@@ -153,7 +153,7 @@ fn modulation_transfer_is_that_of_lens_and_pixel() {
          kernel = \"kernel.csv\"\nglare = 0.05\n",
     );
     let (code, _, err) = camsim(&["lens", &camera, "check"]);
-    assert!(code != 0 && err.contains("kernel.csv"), "{err}");
+    assert!(code != 0 && err.contains("kernel.csv") && err.contains("check point_spread.kernel"), "{err}");
     file(folder.path(), "kernel.csv", "1,2,1\n2,4,2\n1,2,1\n");
     let (code, out, err) = camsim(&["lens", &camera, "check", "--mtf", "--json"]);
     assert_eq!(code, 0, "{err}");

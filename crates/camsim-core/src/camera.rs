@@ -13,6 +13,7 @@ use crate::scenario::CameraSpec;
 
 mod bulk;
 mod check;
+mod field;
 mod lens_inverse;
 mod zoom;
 

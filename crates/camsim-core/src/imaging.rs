@@ -12,6 +12,7 @@ mod exposed;
 mod facts;
 mod fixed_pattern;
 mod flicker;
+mod levels;
 mod optics;
 mod settings;
 
@@ -30,6 +31,7 @@ use crate::{
 
 pub use draw::{Draws, LARGE_MEAN, two_words};
 pub use facts::{Fact, facts, with_facts};
+pub use levels::{SensorLevels, sensor_levels};
 pub use optics::{KernelError, KernelFile, LensTransfer, Optics, SpreadKernel};
 
 use exposed::Exposed;

@@ -138,20 +138,20 @@ impl<'a> TimingFaults<'a> {
         }
     }
 
-    /// From the begin of the window to the trigger of the picture that a frame shows, seconds.
+    /// From the start of the window to the trigger of the picture that a frame shows, seconds.
     #[must_use]
     pub fn trigger_s(&self, frame: i64) -> f64 {
         let picture = self.picture(frame);
         self.nominal_s(picture) + self.late_s(picture)
     }
 
-    /// From the begin of the window to the time at which a frame was meant to be taken, seconds.
+    /// From the start of the window to the time at which a frame was meant to be taken, seconds.
     #[must_use]
     pub fn nominal_s(&self, frame: i64) -> f64 {
         (frame as f64 + self.phase) / self.fps
     }
 
-    /// From the begin of the window to the time that the stamp of a frame shows, seconds, but for
+    /// From the start of the window to the time that the stamp of a frame shows, seconds, but for
     /// `camera.clock_offset_ms`.
     #[must_use]
     pub fn stamp_s(&self, frame: i64) -> f64 {

@@ -89,7 +89,7 @@ pub enum CameraFileError {
     #[error(transparent)]
     LensTable(#[from] LensTableError),
     /// The file of a kernel cannot be used.
-    #[error(transparent)]
+    #[error("{0}; check point_spread.kernel")]
     Kernel(#[from] KernelFileError),
     /// The values do not make a camera.
     #[error("{}: {source}", path.display())]

@@ -37,6 +37,7 @@ mod pose_table;
 mod scene;
 mod sensors;
 mod track_points;
+mod unlikely;
 
 pub use optics::vignette_warnings;
 use optics::{load_zoom_track, optics_warnings};
@@ -44,6 +45,7 @@ pub use scene::board_position_ned_m;
 use scene::load_scene;
 pub use sensors::{load_sensors, sensor_warnings};
 pub use track_points::TrackInputs;
+use unlikely::unlikely_values;
 
 /// Maximum number of frames of a sequence: four days at 30 per second. More is a mistake in `camera.fps`.
 const MAX_FRAMES: f64 = 10e6;
@@ -213,7 +215,7 @@ pub enum LoadError {
     #[error(transparent)]
     LensTable(#[from] LensTableError),
     /// The file of a kernel cannot be used.
-    #[error(transparent)]
+    #[error("{0}; check camera.point_spread.kernel")]
     Kernel(#[from] KernelFileError),
     /// A sensor cannot be simulated.
     #[error(transparent)]
@@ -529,6 +531,7 @@ fn warnings(
 ) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
     warnings.extend(invalid_pixels_warning(sequence));
+    warnings.extend(unlikely_values(&sequence.scenario.camera));
     warnings.extend(optics_warnings(sequence));
     let far_m = sequence.path.pose(sequence.start_s).position_ned_m.length();
     if far_m > FAR_FROM_ORIGIN_M {

@@ -202,6 +202,9 @@ fn what_a_format_has_no_place_for_is_named() {
             CalibrationFormat::Stmap => CameraSpec::default(),
             format => read_back(std::slice::from_ref(&spec), format).unwrap().cameras.remove(0),
         };
+        // The file has it as `cam0`.
+        let is_numbered = matches!(format, CalibrationFormat::Kalibr | CalibrationFormat::OpenVins);
+        assert!(!(is_numbered && named("name")), "{}: {:?}", format.name(), exported.notes);
         let values = |spec: &CameraSpec| toml::Table::try_from(spec).unwrap();
         let value = |table: &toml::Table, key: &str| match key.split_once('.') {
             Some((first, second)) => table.get(first).and_then(|below| below.get(second)).cloned(),

@@ -1,5 +1,6 @@
 //! `camsim explain`: the plan of one frame, without rendering it.
 
+mod camera;
 mod sensors;
 mod twins;
 
@@ -50,6 +51,7 @@ struct ExplainReport<'a> {
     log: LogFacts,
     tracker: TrackerFacts,
     terrain: Option<TerrainFacts>,
+    camera: camera::CameraFacts<'a>,
     warnings: &'a [String],
     plan: PlanSummary<'a>,
     /// The face that `plan` is of, where a wide field is divided among several.
@@ -244,6 +246,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
     let models = models(&loaded.sequence, &plan);
     let memory = memory(&loaded.sequence, &plan);
     let source_frame = SourceFrameFields::of(&source_frame(&loaded.sequence, &plan));
+    let camera = camera::facts(&loaded.sequence.scenario.camera, plan.zoom)?;
     let moving = loaded.sequence.scene.moving_objects();
     let sensors = sensors::facts(&loaded.sensors);
     let tracked = &loaded.tracked;
@@ -256,6 +259,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
             log,
             tracker,
             terrain,
+            camera,
             warnings,
             plan: plan.summary(),
             face: plan.camera.lens.face().map(Face::name),
@@ -289,6 +293,7 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
         print_terrain(terrain, console)?;
     }
     print_light(&loaded, console)?;
+    camera::print(&camera, console)?;
     sensors::print(&sensors, console)?;
     let s = if frames == 1 { "" } else { "s" };
     console.line(format_args!("sequence of {frames} frame{s}"))?;

@@ -238,8 +238,9 @@ fn check(report: &LensReport, json: bool, console: &mut Console<'_>) -> Result<(
     }
     let LensCheck { valid_fraction, ray_fraction, angle_max_deg, .. } = report.lens;
     let LensCheck { fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective, .. } = report.lens;
-    console.line(format_args!("pixels with an ideal ray       {:.3} %", 100.0 * valid_fraction))?;
     console.line(format_args!("pixels with a ray              {:.3} %", 100.0 * ray_fraction))?;
+    // An ideal plane holds no others.
+    console.line(format_args!("  at most 89 degrees off axis  {:.3} %", 100.0 * valid_fraction))?;
     console.line(format_args!("largest angle off axis         {angle_max_deg:.3} degrees"))?;
     match (fold_radius_min, fold_radius_max) {
         (Some(min), Some(max)) => {

@@ -3,7 +3,7 @@
 mod planes;
 mod report;
 
-use std::convert::Infallible;
+use std::{convert::Infallible, time::Duration};
 
 use anyhow::anyhow;
 use camsim_core::{
@@ -11,10 +11,11 @@ use camsim_core::{
         CoordErrors, Disocclusion, ErrorVerdict, IdealView, Oracle, RenderOptions, coord_errors,
         disocclusion, image_errors, silhouettes, truth_errors,
     },
-    scenario::{Auto, Channel, Face, Solver},
+    scenario::{Auto, CameraSpec, Channel, Face, Solver},
 };
 use camsim_engine::{Finished, Session};
 use camsim_plan::{FramePlan, Planner, Predicted};
+use indicatif::ProgressBar;
 
 use super::explain::level_of_detail;
 use crate::{
@@ -23,6 +24,7 @@ use crate::{
     failure::{Failure, OrFail},
     frame_list::FrameList,
     inputs::{self, ScenarioArgs},
+    progress::frames_bar,
 };
 
 use planes::{Planes, planes};
@@ -30,6 +32,9 @@ use report::{Measured, Picture, Truth, Verified, VerifyReport, describe_plane, d
 
 /// Number of frames to verify by default.
 const DEFAULT_FRAMES: u64 = 5;
+
+/// Number of instants of an exposure that are measured besides its middle.
+const PHASES: usize = 5;
 
 /// Channels from which errors of sources, depths and points are measured.
 const MEASURED: [Channel; 2] = [Channel::Color, Channel::Coords];
@@ -113,6 +118,9 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         ))?;
         console.line(HEADER)?;
     }
+    console.note(work(&scenario.camera, frames.len() * planner.lanes(), args.pictures));
+    let bar = frames_bar((frames.len() * planner.lanes()) as u64, console.is_quiet());
+    bar.enable_steady_tick(Duration::from_millis(500));
     // A face is verified as the camera that it is, in its own ideal frame.
     for lane in 0..planner.lanes() {
         let sequence = planner.lane(lane).sequence();
@@ -120,20 +128,22 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         let oracle = Oracle::new(sequence.clone()).or_bad_input()?;
         let mut session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
         if let Some(face) = face.filter(|_| !args.json) {
-            console.line(format_args!("face {face}"))?;
+            bar.suspend(|| console.line(format_args!("face {face}")))?;
         }
         for &frame in &frames {
-            let verified = verify(frame, face, &mut session, &oracle, tolerance_px, args.pictures)?;
+            let verified = verify(frame, face, &mut session, &oracle, tolerance_px, args.pictures, &bar)?;
+            bar.inc(1);
             report.kept &= verified.kept
                 && verified.picture.as_ref().is_none_or(|picture| picture.kept)
                 && verified.truth.as_ref().is_none_or(|truth| truth.kept)
                 && verified.planes.kept();
             if !args.json {
-                print(&verified, tolerance_dn, console)?;
+                bar.suspend(|| print(&verified, tolerance_dn, console))?;
             }
             report.frames.push(verified);
         }
     }
+    bar.finish_and_clear();
     if args.json {
         console.json(&report)?;
     }
@@ -169,6 +179,21 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         "frame {frames}: the source error exceeds the tolerance of {tolerance_px} px: {}",
         exceeded_reason(first)
     )))
+}
+
+/// How much there is to trace, as each pixel is traced by the reference renderer.
+fn work(camera: &CameraSpec, pictures: usize, with_pictures: bool) -> String {
+    let [width, height] = camera.size_px;
+    let is_exposed = camera.longest_shutter().is_ok_and(|shutter| shutter.exposure_s() > 0.0);
+    let instants = if is_exposed { 1 + PHASES as u64 } else { 1 };
+    let pixels = pictures as u64 * instants * u64::from(width) * u64::from(height);
+    format!(
+        "tracing {:.3} million pixels on the CPU: {pictures} picture{} of {width}x{height}{}{}",
+        1e-6 * pixels as f64,
+        if pictures == 1 { "" } else { "s" },
+        if is_exposed { format!(" at up to {instants} instants of the exposure") } else { String::new() },
+        if with_pictures { ", and many rays more of each pixel for --pictures" } else { "" }
+    )
 }
 
 /// Checks the number of pixels. Coordinates are always rendered here, regardless of `output.channels`.
@@ -219,10 +244,14 @@ fn verify(
     oracle: &Oracle,
     tolerance_px: f64,
     pictures: bool,
+    bar: &ProgressBar,
 ) -> Result<Verified, Failure> {
+    bar.set_message(format!("frame {frame} "));
     let first = render_at_phase(session, frame, 0.0)?;
     let mut errors = measure(oracle, &first, 0.0)?;
-    for phase in phases(&first.plan) {
+    let phases = phases(&first.plan);
+    for (i, &phase) in phases.iter().enumerate() {
+        bar.set_message(format!("frame {frame}, instant {} of {} ", i + 2, phases.len() + 1));
         let candidate = measure(oracle, &render_at_phase(session, frame, phase)?, f64::from(phase))?;
         if candidate.verdict().p99_px() > errors.verdict().p99_px() {
             errors = candidate;
@@ -230,7 +259,10 @@ fn verify(
     }
     let verdict = errors.verdict();
     let p99_px = verdict.p99_px();
-    let picture = pictures.then(|| picture(oracle, &first));
+    let picture = pictures.then(|| {
+        bar.set_message(format!("frame {frame}, picture "));
+        picture(oracle, &first)
+    });
     let disocclusion_share = disocclusion_of(oracle, &first.plan).share();
     let is_exact = first.plan.has_exact_truth();
     let truth = truth_errors(oracle, first.plan.frame, &first.frame, tolerance_px)
@@ -271,9 +303,8 @@ fn phases(plan: &FramePlan) -> Vec<f32> {
     let steps = f64::from(blur.solved() - 1);
     let middle_of = |share: f64| (((share * steps).floor() + 0.5) / steps - 0.5) as f32;
     // Exactly 0 would be mid-exposure. The last two are incommensurate with vibrations.
-    [-0.5, middle_of(0.25), middle_of(0.75), -0.309, 0.191]
-        .map(|phase| if phase == 0.0 { 1e-4 } else { phase })
-        .to_vec()
+    let phases: [f32; PHASES] = [-0.5, middle_of(0.25), middle_of(0.75), -0.309, 0.191];
+    phases.map(|phase| if phase == 0.0 { 1e-4 } else { phase }).to_vec()
 }
 
 /// Disocclusion of a frame, at mid-exposure and, with motion blur, at both ends, like the planner's probes.
@@ -464,6 +495,20 @@ mod tests {
                 && !error.contains("output.channels"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn the_work_is_told_in_pixels() {
+        let mut camera = CameraSpec { size_px: [640, 480], ..CameraSpec::default() };
+        camera.shutter.exposure_ms = 0.0;
+        assert_eq!(work(&camera, 1, false), "tracing 0.307 million pixels on the CPU: 1 picture of 640x480");
+        camera.shutter.exposure_ms = 5.0;
+        let all = work(&camera, 5, true);
+        assert!(
+            all.starts_with("tracing 9.216 million pixels on the CPU: 5 pictures of 640x480 at up to 6"),
+            "{all}"
+        );
+        assert!(all.ends_with("for --pictures"), "{all}");
     }
 
     #[test]

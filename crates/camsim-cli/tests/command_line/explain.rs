@@ -27,6 +27,35 @@ fn explain_prints_the_frame_of_source_coordinates() {
 }
 
 #[test]
+fn the_field_of_view_and_the_range_of_the_sensor_are_told() {
+    let scenario = assets().join("pattern.toml");
+    let mut args = vec!["explain", text(&scenario)];
+    for change in [
+        "camera.lens={ model = \"pinhole\" }",
+        "camera.focal_px=[400, 400]",
+        "camera.principal_point_px=[319.5, 239.5]",
+        "camera.sensor={ model = \"imx250\", white_e = 5350, black_dn = 95 }",
+        "camera.photometric.noise_sigma=0",
+    ] {
+        args.extend(["--set", change]);
+    }
+    let (code, out, err) = camsim(&args);
+    assert_eq!(code, 0, "{err}");
+    // 2 atan(320 / 400), 2 atan(240 / 400), 2 atan(400 / 400).
+    let field = "640x480 px, pinhole, focal length 400.000, 400.000 px; field of view 77.32 degrees across, 61.93 down, \
+                 90.00 diagonal\n";
+    assert!(out.contains(field), "{out}");
+    // 10700 electrons over 4095 - 95 numbers.
+    let sensor = "sensor: white 5350.0 electrons of at most 10700.0, gain 2.6750 e-/DN, black 95 DN, white 2095.0 DN, \
+                  exposed for 8 ms, 12 bits\n";
+    assert!(out.contains(sensor), "{out}");
+    let (_, out, _) = camsim([&args[..], &["--json"]].concat());
+    let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert!((explained["camera"]["field_deg"][2].as_f64().unwrap() - 90.0).abs() < 1e-9, "{out}");
+    assert_eq!(explained["camera"]["sensor"]["bits"], 12);
+}
+
+#[test]
 fn what_moves_and_what_senses_is_listed() {
     let scenario = assets().join("../examples/propeller/propeller.toml");
     let imu = "imu=[{ name = \"imu0\", rate_hz = 100, attached_to = \"camera\", mount = { offset_m = [0.1, 0, 0] } }]";

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct TimingSpec {
     /// Standard deviation of a random error of every stamp.
     pub jitter_ms: f64,
-    /// How much faster than the platform's clock the camera's runs, from the begin of the window on, millionths.
+    /// How much faster than the platform's clock the camera's runs, from the start of the window on, millionths.
     pub drift_ppm: f64,
     /// Triggers come late by a random time, evenly distributed from 0 to this.
     pub late_ms: f64,

@@ -10,6 +10,7 @@ use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod auto_exposure;
 mod image_sensor;
+mod lens;
 mod motion;
 mod names;
 mod optics;
@@ -21,6 +22,8 @@ mod timing;
 mod tracks;
 mod twins;
 mod video;
+
+use lens::check_coefficients;
 
 pub use rig::{validate_cameras, validate_rig};
 
@@ -196,7 +199,13 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
         });
     }
 
-    check_coefficients(check, "camera.lens.coefficients", camera.lens.model, &camera.lens.coefficients);
+    check_coefficients(
+        check,
+        "camera.lens.coefficients",
+        camera.lens.model,
+        camera.focal_px,
+        &camera.lens.coefficients,
+    );
     let is_table = camera.lens.model == LensModel::Table;
     check.require(is_table == camera.lens_table.is_some(), "camera.lens_table", || match is_table {
         true => "is missing: camera.lens.model is \"table\"; name the file of its points".into(),
@@ -216,6 +225,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
             check,
             &format!("camera.zoom.{i}.coefficients"),
             camera.lens.model,
+            zoom.focal_px,
             &zoom.coefficients,
         );
     }
@@ -252,20 +262,6 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
     check.require(focal_px.iter().all(|&f| f.is_finite() && f > 0.0), key, || {
         format!("must be [fx, fy], both finite and above 0, not {focal_px:?}; a 60 degree lens on 640 px has about 554")
-    });
-}
-
-fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficients: &[f64]) {
-    check.finite(key, coefficients);
-    let facts = model.facts();
-    let (most, order) = (facts.coefficients.len(), format!("the order is {}", facts.order()));
-    check.require(coefficients.len() <= most, key, || {
-        format!("has {} values where at most {most} fit; {order}; {}", coefficients.len(), facts.fix)
-    });
-    // Three coefficients are what other programs call k1 k2 k3.
-    let radial_alone = model == LensModel::BrownConrady && coefficients.len() == 3;
-    check.require(!radial_alone, key, || {
-        format!("has 3 values; {order}: write k1, k2, 0, 0, k3 if they are radial, k1, k2, p1, p2 if not")
     });
 }
 

@@ -126,6 +126,11 @@ impl CalibrationFormat {
         matches!(self, Self::Kalibr | Self::OpenVins | Self::Basalt | Self::Vins)
     }
 
+    /// Whether the file calls the camera at a place so by itself.
+    fn numbers_as(self, name: &str, i: usize) -> bool {
+        matches!(self, Self::Kalibr | Self::OpenVins) && name == format!("cam{i}")
+    }
+
     /// Whether it has the readout of a camera.
     fn has_readout(self, spec: &CameraSpec) -> bool {
         let is_down = spec.shutter.readout == Readout::TopToBottom;
@@ -205,9 +210,9 @@ pub fn export(cameras: &[CameraSpec], format: CalibrationFormat) -> Result<Expor
 /// What the file lacks, and what it has in another form.
 fn notes(cameras: &[Calibration], format: CalibrationFormat) -> Result<Vec<String>, CalibrationError> {
     let mut notes = Vec::new();
-    for camera in cameras {
+    for (i, camera) in cameras.iter().enumerate() {
         let spec = &camera.spec;
-        let lost = lost(spec, format)?;
+        let lost = lost(spec, i, format)?;
         if !lost.is_empty() {
             notes.push(format!(
                 "left out of {}, which has no place for it: {} of {}",
@@ -231,8 +236,9 @@ fn notes(cameras: &[Calibration], format: CalibrationFormat) -> Result<Vec<Strin
     Ok(notes)
 }
 
-/// Keys of a camera that differ from the default and that a format does not hold, with their values.
-fn lost(spec: &CameraSpec, format: CalibrationFormat) -> Result<Vec<String>, CalibrationError> {
+/// Keys of a camera, by its place in the file, that differ from the default and that a format does not hold, with
+/// their values.
+fn lost(spec: &CameraSpec, i: usize, format: CalibrationFormat) -> Result<Vec<String>, CalibrationError> {
     let table = |spec: &CameraSpec| {
         Table::try_from(spec).map_err(|error| CalibrationError::Refused(format!("{}: {error}", spec.name)))
     };
@@ -241,6 +247,7 @@ fn lost(spec: &CameraSpec, format: CalibrationFormat) -> Result<Vec<String>, Cal
     let differs = own.iter().filter(|leaf| !default.contains(leaf));
     Ok(differs
         .filter(|(key, _)| !format.holds(spec, key))
+        .filter(|(key, _)| key != "name" || !format.numbers_as(&spec.name, i))
         .map(|(key, value)| format!("{key} = {value}"))
         .collect())
 }

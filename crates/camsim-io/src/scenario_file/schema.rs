@@ -599,12 +599,17 @@ impl Schema {
             let similarity = similarity(leaf, its_leaf);
             if its_parent == parent { similarity + 0.15 } else { similarity }
         };
-        // Tables may share a name, such as exposure_ms: the more similar table decides.
-        let of_table = |name: &str| similarity(parent, name.rsplit_once('.').map_or("", |(table, _)| table));
-        let order = |a: &&str, b: &&str| {
-            score(a).total_cmp(&score(b)).then_with(|| of_table(a).total_cmp(&of_table(b)))
+        // Several tables have names such as exposure_ms. Of a parent that is no table the more similar table decides;
+        // else a key below the parent is meant, and the first of them is the usual one.
+        let is_known_parent = self.is_table(parent);
+        let of_table = |name: &str| match is_known_parent {
+            true => f64::from(u8::from(name.strip_prefix(parent).is_some_and(|rest| rest.starts_with('.')))),
+            false => similarity(parent, name.rsplit_once('.').map_or("", |(table, _)| table)),
         };
-        let best = names.into_iter().max_by(order)?;
+        let order = |(i, a): &(usize, &str), (k, b): &(usize, &str)| {
+            score(a).total_cmp(&score(b)).then_with(|| of_table(a).total_cmp(&of_table(b))).then(k.cmp(i))
+        };
+        let (_, best) = names.into_iter().enumerate().max_by(order)?;
         (score(&best) > MIN_KEY_SIMILARITY).then(|| best.to_owned())
     }
 }

@@ -364,6 +364,16 @@ fn errors_name_file_line_and_key() {
             "dir/s.toml:6: camera.shuter: unknown key; did you mean `camera.shutter`?",
         ),
         ("[camera]\nreadout_ms = 3", "did you mean `camera.shutter.readout_ms`?"),
+        ("[camera]\nexposure_ms = 8", "did you mean `camera.shutter.exposure_ms`?"),
+        ("[camera]\ncoefficients = [0.1]", "did you mean `camera.lens.coefficients`?"),
+        ("[camera.lens]\nfocal_px = [1, 1]", "did you mean `camera.focal_px`?"),
+        ("[camera]\nf_number = 4", "did you mean `camera.sensor.f_number`?"),
+        ("[[imu]]\nname = \"a\"\nangles_deg = [1, 2, 3]", "did you mean `imu.mount.angles_deg`?"),
+        ("focal_px = [1, 1]", "did you mean `camera.focal_px`?"),
+        (
+            "[camera.lens]\nmodel = \"eucm\"\ncoefficients = [0.6, -1.0]",
+            "dir/s.toml:8: camera.lens.coefficients: has beta = -1; beta must be above 0",
+        ),
         ("[quality]\nxyz = 3", "quality.xyz: unknown key; `camsim render --print-default`"),
         (
             "[camera]\nresolution = [640, 480]",

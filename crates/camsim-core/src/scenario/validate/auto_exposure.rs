@@ -25,7 +25,7 @@ pub(super) fn check_auto_exposure(check: &mut Check, camera: &CameraSpec) {
     for (leaf, [least, most]) in [("exposure_ms", spec.exposure_ms), ("gain", spec.gain)] {
         check.require(least > 0.0 && least <= most && most.is_finite(), key(leaf), || {
             format!(
-                "must be [smallest, largest], both above 0, not [{least}, {most}]; the same twice fixes it"
+                "must be [smallest, largest], both above 0, not [{least}, {most}]; two equal numbers fix the value"
             )
         });
     }

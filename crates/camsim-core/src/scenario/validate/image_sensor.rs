@@ -81,12 +81,14 @@ fn check_light(check: &mut Check, camera: &CameraSpec, spec: &ImageSensorSpec) {
         value.into_iter().for_each(|value| check.positive(key(leaf), value, "it is what white stands for"));
     }
     let known = with_facts(spec);
+    // What a second scale would need is no remedy.
+    let is_one_scale = given == 1;
     let exposure_ms = spec.exposure_ms.unwrap_or(camera.shutter.exposure_ms);
     check.not_negative(key("exposure_ms"), exposure_ms, "leave it out for camera.shutter.exposure_ms");
     let mut needs = |leaf: &str, is_given: bool, what: &str| {
         check.require(is_given, key(leaf), || format!("is missing: {what}; add it, or give white_e"));
     };
-    if spec.white_lux.is_some() || spec.white_w_m2.is_some() {
+    if is_one_scale && (spec.white_lux.is_some() || spec.white_w_m2.is_some()) {
         needs("pixel_um", known.pixel_um.is_some(), "photons are counted over the area of a pixel");
         let efficiency = known.quantum_efficiency.is_some();
         needs("quantum_efficiency", efficiency, "it takes photons to electrons, and no source states it");
@@ -96,7 +98,7 @@ fn check_light(check: &mut Check, camera: &CameraSpec, spec: &ImageSensorSpec) {
             "light is collected for that time, as camera.shutter.exposure_ms is 0",
         );
     }
-    if spec.white_lux.is_some() {
+    if is_one_scale && spec.white_lux.is_some() {
         needs("f_number", spec.f_number.is_some(), "it says how much of the scene's light the lens collects");
     }
     for (leaf, value) in [("f_number", spec.f_number), ("pixel_um", spec.pixel_um)] {
@@ -263,13 +265,11 @@ mod tests {
     #[test]
     fn wrong_values_are_named_with_a_remedy() {
         type Change = fn(&mut Scenario, &mut ImageSensorSpec);
-        let cases: [(&str, Change); 26] = [
+        let cases: [(&str, Change); 27] = [
             ("camera.sensor.white_e", |_, s| s.white_e = None),
             ("camera.sensor.white_e", |_, s| s.white_e = Some(0.0)),
-            ("camera.sensor.white_e", |_, s| {
-                (s.white_lux, s.f_number, s.pixel_um, s.quantum_efficiency, s.exposure_ms) =
-                    (Some(1.0), Some(1.0), Some(1.0), Some(PerChannel::One(0.5)), Some(1.0));
-            }),
+            ("camera.sensor.white_e", |_, s| s.white_lux = Some(1e4)),
+            ("camera.sensor.white_e", |_, s| (s.white_lux, s.white_w_m2) = (Some(1e4), Some(1.0))),
             // No source states its quantum efficiency.
             ("camera.sensor.quantum_efficiency", |_, s| {
                 (s.white_e, s.white_w_m2, s.model, s.exposure_ms) =

@@ -91,7 +91,13 @@ fn check_lens(check: &mut Check, camera: &CameraSpec, chromatic: &ChromaticSpec,
     }
     check.finite(format!("{key}.principal_point_px"), &lens.principal_point_px.unwrap_or_default());
     let own = camera.of_primary(primary);
-    check_coefficients(check, &format!("{key}.coefficients"), own.lens.model, &own.lens.coefficients);
+    check_coefficients(
+        check,
+        &format!("{key}.coefficients"),
+        own.lens.model,
+        own.focal_px,
+        &own.lens.coefficients,
+    );
     check.require(lens.model != Some(LensModel::Table), format!("{key}.model"), || {
         format!(
             "cannot be \"table\"; give camera.chromatic.{}_scale beside the camera's table",
