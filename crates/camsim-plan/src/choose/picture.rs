@@ -108,15 +108,10 @@ pub(crate) fn choose(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Pict
     };
     let Some(model) = &scene.silhouettes else {
         let blended_dn = scene.blended_dn();
-        let up_to = |most_scale: f64| {
-            let others_dn =
-                |plan: &SamplingPlan, _| is_up_to(most_scale, plan.scale, &task).then_some(blended_dn);
-            let search = SamplingSearch { prices: scene.prices(), task: &task, others_dn: &others_dn };
-            context.request.given.map_or_else(|| search.choose(), |given| search.given(&given))
-        };
-        let usual = up_to(MOST_SCALE);
-        // A texture of hard borders, such as a board, may need what silhouettes do.
-        let choice = if usual.within { usual } else { up_to(FINEST_SCALE) };
+        let others_dn =
+            |plan: &SamplingPlan, _| is_up_to(MOST_SCALE, plan.scale, &task).then_some(blended_dn);
+        let search = SamplingSearch { prices: scene.prices(), task: &task, others_dn: &others_dn };
+        let choice = context.request.given.map_or_else(|| search.choose(), |given| search.given(&given));
         return PictureChoice::new(&choice, None, false, [1, 0]);
     };
     SilhouetteSearch { context, scene, task, model }.choose()

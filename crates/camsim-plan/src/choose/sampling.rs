@@ -28,7 +28,7 @@ const FAR: f64 = 1.7;
 /// Scales of the ideal frame that are tried, of the camera's.
 const SCALES: [f64; 14] =
     [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, 4.0, 4.5, FINEST_SCALE];
-/// Finer ideal frames are for silhouettes, and where nothing else keeps the tolerance.
+/// Finer ideal frames are for silhouettes alone.
 pub(crate) const MOST_SCALE: f64 = 2.0;
 /// As many pixels along a side of one of the camera's as are read.
 pub(crate) const FINEST_SCALE: f64 = MOST_TAPS as f64;
