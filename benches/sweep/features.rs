@@ -33,7 +33,7 @@ const FEATURES: [(&str, &str, Option<&str>, Option<&str>); 8] = [
     (
         "point spread and glare",
         "camera.point_spread",
-        Some("{ glare = 0.0 }"),
+        None,
         Some("{ sigma_px = 0.7, f_number = 8.0, pixel_um = 3.45, glare = 0.02 }"),
     ),
     (
@@ -61,8 +61,14 @@ pub fn features(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
     {
         for (how, value) in [("without effect", without_effect), ("at work", at_work)] {
             let Some(value) = value else { continue };
-            let set = [(key, value.to_owned())];
-            let sequence = all_effects_with(if key.is_empty() { &[] } else { &set })?;
+            let mut sets = vec![(key, value.to_owned())];
+            match key {
+                "" => sets.clear(),
+                // A sensor has noise of its own.
+                "camera.sensor" => sets.push(("camera.photometric.noise_sigma", "0.0".to_owned())),
+                _ => {}
+            }
+            let sequence = all_effects_with(&sets)?;
             let name = if key.is_empty() { name.to_owned() } else { format!("{name}, {how}") };
             table.add(name, &sequence, color, false)?;
         }
