@@ -34,7 +34,7 @@ class Frames(Iterator[Frame]):
                 pictures = [native.twin(name, instant) for instant in range(instants)]
                 self._twins[name] = _Burst(pictures, numbers, of_twin)
 
-    def with_bar(self) -> Frames:
+    def _with_bar(self) -> Frames:
         """Shows a bar by tqdm from now on, if that is installed."""
         try:
             self._bar = importlib.import_module("tqdm.auto").tqdm(total=self._left, unit="frame")

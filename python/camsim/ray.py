@@ -69,8 +69,8 @@ def dataset(
 
 def _rendered(samples: Samples, concurrency: int | tuple[int, int], num_cpus: float, batch_size: int) -> Any:
     blocks = max(1, -(-len(samples) // batch_size))
-    # Not `ray.data.range`: its tasks want processors, and wait forever where a machine was lost and the renderers
-    # have taken those of the others.
+    # Not `ray.data.range`: its tasks need processors. After a machine is lost, its renderers may take all that are left,
+    # and those tasks then wait forever.
     numbers = ray.data.from_items([{"id": number} for number in range(len(samples))], override_num_blocks=blocks)
     return numbers.map_batches(
         _Renderer,

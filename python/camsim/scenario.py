@@ -300,7 +300,7 @@ class Scenario(Sequence[Frame]):
         ...     train(frame.color, frame.flow)
         """
         frames = self._frames(self._numbers(slice(start, stop, step)), channel_names(channels), twins)
-        return frames.with_bar() if progress else frames
+        return frames._with_bar() if progress else frames
 
     def _number(self, index: SupportsIndex) -> int:
         """The number of a frame, which may be counted from the end."""

@@ -8,7 +8,11 @@ use std::f64::consts::{PI, TAU};
 use camsim_core::camera::CameraModel;
 use camsim_core::lens::LensModel;
 use glam::DVec2;
+use polygon::winding;
 use rayon::prelude::*;
+
+#[path = "lens_models/polygon.rs"]
+mod polygon;
 
 const RAYS: usize = 360;
 const STEPS: usize = 1500;
@@ -100,20 +104,6 @@ impl Set {
         }
         0.5 * (good + bad)
     }
-}
-
-/// Winding number of a closed polygon about a point, and its distance.
-fn winding(polygon: &[DVec2], point: DVec2) -> (i32, f64) {
-    let mut turned = 0.0;
-    let mut distance = f64::INFINITY;
-    for (i, a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (to_a, along) = (*a - point, b - *a);
-        turned += to_a.angle_to(b - point);
-        let share = (-to_a.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
-        distance = distance.min((to_a + along * share).length());
-    }
-    ((turned / TAU).round() as i32, distance)
 }
 
 #[test]

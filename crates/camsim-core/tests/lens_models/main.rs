@@ -7,10 +7,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use camsim_core::camera::CameraModel;
 use camsim_core::lens::{Lens, LensModel};
 use glam::{DVec2, DVec3};
+use polygon::winding;
 use rayon::prelude::*;
-use scan::{Border, RAYS, Rim, border_px, direction, ray, winding};
+use scan::{Border, RAYS, Rim, border_px, direction, ray};
 use sets::{Set, golden_sets, hostile_sets};
 
+mod polygon;
 mod scan;
 mod sets;
 
