@@ -156,7 +156,8 @@ fn report_clap(error: &clap::Error, console: &mut Console<'_>) -> u8 {
             console.complain(&text.to_string());
             if let Some(feature) = left_out(error) {
                 console.complain(&format!(
-                    "This build leaves that command out. `cargo build --release --features {feature}` in camsim's sources has it.\n"
+                    "This build leaves that command out. `cargo build --release --features {feature}` in camsim's \
+                     sources has it.\n"
                 ));
             }
             failure::BAD_INPUT

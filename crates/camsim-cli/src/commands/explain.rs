@@ -491,8 +491,8 @@ fn print_lamps(scene: &scene::Scene, console: &mut Console<'_>) -> Result<(), Fa
     let count = scene.lamps().count();
     if count > 0 {
         console.line(format_args!(
-            "lamps: {count} meshes emit light above white; pixels that those of at most {SMALL_LAMP_PX} px may reach are \
-             means of rays of their own"
+            "lamps: {count} meshes emit light above white; pixels that those of at most {SMALL_LAMP_PX} px may reach \
+             are means of rays of their own"
         ))?;
     }
     Ok(())

@@ -79,7 +79,7 @@ pub struct PrimaryLensSpec {
 }
 
 impl ChromaticSpec {
-    /// Terms of a primary's scale; none of green, and where none are given.
+    /// Terms of a primary's scale; none of green, and of one that is imaged as green is.
     #[must_use]
     pub fn scale(&self, primary: Primary) -> Option<[f64; 3]> {
         let given = match primary {
@@ -88,7 +88,8 @@ impl ChromaticSpec {
             Primary::Blue => &self.blue_scale,
         };
         let term = |i: usize| given.get(i).copied().unwrap_or(0.0);
-        (!given.is_empty()).then(|| [term(0), term(1), term(2)])
+        let terms = [term(0), term(1), term(2)];
+        (!given.is_empty() && terms != [1.0, 0.0, 0.0]).then_some(terms)
     }
 
     /// A primary's own lens.
@@ -227,6 +228,20 @@ mod tests {
             red.model = Some(LensModel::KannalaBrandt);
         });
         assert!(other.of_primary(Primary::Red).lens.coefficients.is_empty());
+    }
+
+    #[test]
+    fn a_scale_of_one_is_no_aberration() {
+        let scaled = |terms: &[f64]| CameraSpec {
+            chromatic: Some(ChromaticSpec {
+                red_scale: terms.to_vec(),
+                blue_scale: vec![1.0],
+                ..Default::default()
+            }),
+            ..CameraSpec::default()
+        };
+        assert!(!scaled(&[1.0]).is_chromatic() && !scaled(&[1.0, 0.0, 0.0]).is_chromatic());
+        assert!(scaled(&[1.0, 0.0, 1e-6]).is_chromatic() && scaled(&[1.001]).is_chromatic());
     }
 
     #[test]

@@ -194,8 +194,8 @@ fn stretched(size_px: [u32; 2], dem: &Dem) -> Option<String> {
     let is_like = |other: f64| (of_picture / other).ln().abs() < LIKE_SHAPE;
     (!is_like(of_ground) && !is_like(aspect(dem.size.map(f64::from)))).then(|| {
         format!(
-            "it has no georeference and is spread over the DEM, which makes it {:.2} times as wide for its height: if it shows \
-             other ground, give it a world file, or cut it to the DEM's extent",
+            "it has no georeference and is spread over the DEM, which makes it {:.2} times as wide for its height: \
+             if it shows other ground, give it a world file, or cut it to the DEM's extent",
             of_ground / of_picture
         )
     })
