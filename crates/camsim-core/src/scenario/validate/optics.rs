@@ -58,14 +58,14 @@ fn check_scale(check: &mut Check, camera: &CameraSpec, chromatic: &ChromaticSpec
     check.require(given.len() <= 3, &key, || {
         format!("has {} values where at most 3 fit: v, c, b of the factor v + c r + b r^2", given.len())
     });
+    check.require(given.is_empty() || chromatic.lens(primary).is_none(), &key, || {
+        format!("cannot be combined with camera.chromatic.{}; leave one of them out", primary.name())
+    });
     let Some(terms @ [v, c, b]) =
         chromatic.scale(primary).filter(|terms| terms.iter().all(|k| k.is_finite()))
     else {
         return;
     };
-    check.require(chromatic.lens(primary).is_none(), &key, || {
-        format!("cannot be combined with camera.chromatic.{}; leave one of them out", primary.name())
-    });
     let half_short_px = 0.5 * f64::from(camera.size_px[0].min(camera.size_px[1]));
     let most = corner_px(camera) / half_short_px;
     let is_near = |r: f64| {
