@@ -2,8 +2,8 @@
 //!
 //! | kind | motion | limits | distance to the log |
 //! |---|---|---|---|
-//! | `sqrt` | two nested square-root loops on a double integrator follow the log, smoothed without lag | kept at every tick | small |
-//! | `spline` | the same plant follows a quadratic B-spline fitted to the whole log under the acceleration limits | kept at every tick | smallest |
+//! | `sqrt` | two nested square-root loops on a double integrator follow the log, smoothed without lag | kept at every instant | small |
+//! | `spline` | a plant whose accelerations are continuous follows a cubic B-spline fitted to the whole log under the acceleration limits | kept at every instant | smallest |
 //! | `linear` | straight lines and great circles between rows; velocity jumps at rows | none | zero |
 //! | `hold` | the pose of the latest row, without velocity | none | one row |
 //!
@@ -27,7 +27,7 @@ mod reference;
 mod report;
 mod spline;
 
-use reference::{LogInterpolator, Reference};
+use reference::{Curve, LogInterpolator, Reference, Ticks};
 pub use report::{Channels, MotionUse, TrackReport};
 
 /// Limits of the platform, all positive and finite.
@@ -264,12 +264,11 @@ pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<TrackResult, Tracker
             saturation_intervals
                 .iter_mut()
                 .for_each(|hold| (hold.from_s, hold.to_s) = (start_s + hold.from_s, start_s + hold.to_s));
-            given(
-                Trajectory::uniform(start_s, reference.step_s, end_s, states),
-                limits,
-                saturation,
-                saturation_intervals,
-            )
+            let trajectory = match reference.curve {
+                Curve::Quadratic => Trajectory::uniform(start_s, reference.step_s, end_s, states),
+                Curve::Cubic => Trajectory::uniform_smooth(start_s, reference.step_s, end_s, states),
+            };
+            given(trajectory, limits, saturation, saturation_intervals)
         }
     }
 }
@@ -282,16 +281,17 @@ fn reference(rows: &[LogRow], spec: &TrackerSpec) -> Result<(Reference, Resolved
     if ticks > MAX_TICKS as f64 {
         return Err(TrackerError::TooLong { span_s, rate_hz: spec.rate_hz, ticks });
     }
-    let count = ticks as usize + 1;
     let mut log = LogInterpolator::new(rows).ok_or(TrackerError::Empty)?;
     let is_spline = spec.kind == TrackerKind::Spline;
     let sigma_s = if is_spline { SPLINE_BASE_SIGMA_S } else { REFERENCE_SIGMA_S };
-    let smoothed = Reference::smoothed(&mut log, start_s, step_s, count, sigma_s);
+    let curve = if is_spline { Curve::Cubic } else { Curve::Quadratic };
+    let ticks = Ticks { curve, start_s, step_s, count: ticks as usize };
+    let smoothed = Reference::smoothed(&mut log, ticks, sigma_s);
     let limits = resolve_limits(rows, spec, smoothed.accelerations(AUTO_RANK));
     if !is_spline {
         return Ok((smoothed, limits));
     }
-    let raw = Reference::sampled(&mut log, start_s, step_s, count);
+    let raw = Reference::sampled(&mut log, ticks);
     Ok((spline::plan_spline(&raw, smoothed, &limits), limits))
 }
 

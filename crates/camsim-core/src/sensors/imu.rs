@@ -151,7 +151,7 @@ impl Imu {
         let mut gyro_bias = Series::new(&self.gyro.errors, self.clock.first());
         let mut accel_bias = Series::new(&self.accel.errors, self.clock.first());
         self.clock.times().map(move |time| {
-            let body = self.input.trajectory.state(time.t_s);
+            let body = self.input.trajectory.felt_state(time.t_s);
             let motion = match &self.shaking {
                 Some(part) => self.mount.motion_on(part, time.t_s, &body),
                 None => self.mount.motion(&body),

@@ -9,7 +9,7 @@ use crate::{
     flight_log::LogRow,
     geodesy::Geodetic,
     pose::BodyState,
-    scenario::{ImuSpec, PerAxis, TrackerSpec, TriadSpec},
+    scenario::{ImuSpec, PerAxis, TrackerKind, TrackerSpec, TriadSpec},
     tracker::track,
     trajectory::so3,
 };
@@ -54,8 +54,12 @@ fn imu(spec: ImuSpec, input: &SensorInput) -> Imu {
 
 /// A flight with turns, banks and climbs, tracked at 400 Hz.
 fn flown(seconds: f64) -> Trajectory {
+    flown_by(TrackerKind::Sqrt, 10.0, seconds)
+}
+
+fn flown_by(kind: TrackerKind, rows_hz: f64, seconds: f64) -> Trajectory {
     let row = |i: usize| {
-        let t_s = 0.1 * i as f64;
+        let t_s = i as f64 / rows_hz;
         let turn = 0.25 * t_s;
         LogRow {
             t_s,
@@ -69,6 +73,6 @@ fn flown(seconds: f64) -> Trajectory {
                 * DQuat::from_rotation_x(0.5 * (2.3 * turn).sin()),
         }
     };
-    let rows: Vec<LogRow> = (0..=(10.0 * seconds) as usize).map(row).collect();
-    Arc::unwrap_or_clone(track(&rows, &TrackerSpec::default()).unwrap().trajectory)
+    let rows: Vec<LogRow> = (0..=(rows_hz * seconds) as usize).map(row).collect();
+    Arc::unwrap_or_clone(track(&rows, &TrackerSpec { kind, ..TrackerSpec::default() }).unwrap().trajectory)
 }

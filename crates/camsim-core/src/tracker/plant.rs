@@ -11,13 +11,21 @@
 //! Errors, speeds and accelerations are vectors whose lengths are limited. The velocity after a tick lies
 //! between the one before and the demanded one, both inside the ball of the speed limit, so all limits hold
 //! at every tick, for any log.
+//!
+//! On a cubic reference the same loops give the motion of another point: with their velocities u and accelerations
+//! a_k = (u_k - u_(k-1))/h, which the plant takes on linearly until tick k, its velocity is a quadratic B-spline with
+//! coefficients u. It lies within their hull, as accelerations lie between those of two ticks: all limits hold at
+//! every instant. In the last interval the acceleration goes back to zero.
 
 use glam::{DQuat, DVec3};
 
-use super::{Limit, MAX_INTERVALS, ResolvedLimits, Saturation, SaturationInterval, reference::Reference};
+use super::{
+    Limit, MAX_INTERVALS, ResolvedLimits, Saturation, SaturationInterval,
+    reference::{Curve, Reference},
+};
 use crate::{
     pose::BodyState,
-    trajectory::{advance, so3},
+    trajectory::{advance, advance_smoothly, so3},
 };
 
 /// Gain of the linear zone, 1/s. With braking at 0.8 of the limit, a 10 m step has no overshoot from 50 to
@@ -94,20 +102,50 @@ pub(crate) struct PlantRun {
 
 /// Follows the reference, starting in its first state.
 pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> PlantRun {
-    let step_s = reference.step_s;
-    let linear = SqrtLoops::new(step_s, limits.max_speed_m_s, limits.max_acceleration_m_s2);
-    let angular =
-        SqrtLoops::new(step_s, limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2);
-    let mut saturation = SaturationTimer::new(step_s);
-    let mut target = reference.target(0);
-    let mut state = BodyState {
+    let loops = Loops::new(reference.step_s, limits);
+    match reference.curve {
+        Curve::Quadratic => follow_quadratic(reference, limits, &loops),
+        Curve::Cubic => follow_cubic(reference, limits, &loops),
+    }
+}
+
+/// Loops of position and of attitude.
+struct Loops {
+    linear: SqrtLoops,
+    angular: SqrtLoops,
+}
+
+impl Loops {
+    fn new(step_s: f64, limits: &ResolvedLimits) -> Self {
+        Self {
+            linear: SqrtLoops::new(step_s, limits.max_speed_m_s, limits.max_acceleration_m_s2),
+            angular: SqrtLoops::new(
+                step_s,
+                limits.max_angular_rate_rad_s,
+                limits.max_angular_acceleration_rad_s2,
+            ),
+        }
+    }
+}
+
+/// The reference's first state, without accelerations.
+fn first_state(reference: &Reference, limits: &ResolvedLimits) -> BodyState {
+    let target = reference.target(0);
+    BodyState {
         position_ned_m: target.position_ned_m,
         velocity_ned_m_s: target.velocity_ned_m_s.clamp_length_max(limits.max_speed_m_s),
         acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body: target.ned_from_body,
         rate_body_rad_s: target.rate_body_rad_s.clamp_length_max(limits.max_angular_rate_rad_s),
         angular_acceleration_body_rad_s2: DVec3::ZERO,
-    };
+    }
+}
+
+fn follow_quadratic(reference: &Reference, limits: &ResolvedLimits, loops: &Loops) -> PlantRun {
+    let step_s = reference.step_s;
+    let mut saturation = SaturationTimer::new(step_s);
+    let mut target = reference.target(0);
+    let mut state = first_state(reference, limits);
     let mut states = Vec::with_capacity(reference.ticks());
     for k in 1..reference.ticks() {
         let next = reference.target(k);
@@ -115,7 +153,8 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> PlantRun
         // Error that would remain if the next tick had exactly the target's velocity.
         let reached =
             state.position_ned_m + (state.velocity_ned_m_s + next.velocity_ned_m_s) * (0.5 * step_s);
-        let moved = linear.step(state.velocity_ned_m_s, next.position_ned_m - reached, next.velocity_ned_m_s);
+        let moved =
+            loops.linear.step(state.velocity_ned_m_s, next.position_ned_m - reached, next.velocity_ned_m_s);
         state.acceleration_ned_m_s2 = (moved.velocity - state.velocity_ned_m_s) / step_s;
 
         // The same on the rotation group: the error is a rotation vector in body axes, and the target's rate
@@ -125,15 +164,10 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> PlantRun
         let (rate, mean_rate) = (state.rate_body_rad_s, 0.5 * (state.rate_body_rad_s + target_rate));
         let coning = rate.cross(target_rate) * (step_s * step_s / 12.0);
         let reached = state.ned_from_body * so3::exp(mean_rate * step_s + coning);
-        let turned = angular.step(rate, so3::log(reached.inverse() * next.ned_from_body), target_rate);
+        let turned = loops.angular.step(rate, so3::log(reached.inverse() * next.ned_from_body), target_rate);
         state.angular_acceleration_body_rad_s2 = (turned.velocity - rate) / step_s;
 
-        saturation.tick([
-            moved.velocity_limited,
-            moved.acceleration_limited,
-            turned.velocity_limited,
-            turned.acceleration_limited,
-        ]);
+        saturation.tick(&moved, &turned);
         states.push(state);
         state = advance(&state, step_s);
         // Velocities are copied, not integrated, so that rounding cannot exceed a limit.
@@ -145,8 +179,57 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> PlantRun
     state.acceleration_ned_m_s2 = DVec3::ZERO;
     state.angular_acceleration_body_rad_s2 = DVec3::ZERO;
     states.push(state);
-    let saturation_intervals = saturation.finished();
-    PlantRun { states, saturation: saturation.longest, saturation_intervals }
+    saturation.run(states)
+}
+
+fn follow_cubic(reference: &Reference, limits: &ResolvedLimits, loops: &Loops) -> PlantRun {
+    let step_s = reference.step_s;
+    let mut saturation = SaturationTimer::new(step_s);
+    let mut target = reference.target(0);
+    let mut state = first_state(reference, limits);
+    // The velocity and rate of the loops.
+    let (mut velocity, mut rate) = (state.velocity_ned_m_s, state.rate_body_rad_s);
+    let mut states = Vec::with_capacity(reference.ticks());
+    for k in 1..reference.ticks() {
+        let next = reference.target(k);
+        // The state at the next tick from the velocity and rate of the loops there.
+        let reach = |next_velocity: DVec3, next_rate: DVec3| {
+            let to = BodyState {
+                acceleration_ned_m_s2: (next_velocity - velocity) / step_s,
+                angular_acceleration_body_rad_s2: (next_rate - rate) / step_s,
+                ..state
+            };
+            let reached = advance_smoothly(&state, &to, step_s, step_s);
+            BodyState {
+                // The means, not integrals, so that rounding cannot exceed a limit.
+                velocity_ned_m_s: 0.5 * (velocity + next_velocity),
+                rate_body_rad_s: 0.5 * (rate + next_rate),
+                acceleration_ned_m_s2: to.acceleration_ned_m_s2,
+                angular_acceleration_body_rad_s2: to.angular_acceleration_body_rad_s2,
+                ned_from_body: reached.ned_from_body.normalize(),
+                ..reached
+            }
+        };
+        states.push(state);
+        if k + 1 == reference.ticks() {
+            state = reach(velocity, rate);
+            break;
+        }
+        let own_from_target: DQuat = state.ned_from_body.inverse() * target.ned_from_body;
+        let target_rate = own_from_target * next.rate_body_rad_s;
+        // Error that would remain if the loops had exactly the target's velocity and rate.
+        let reached = reach(next.velocity_ned_m_s, target_rate);
+        let off_m = next.position_ned_m - reached.position_ned_m;
+        let off_rad = so3::log(reached.ned_from_body.inverse() * next.ned_from_body);
+        let moved = loops.linear.step(velocity, off_m, next.velocity_ned_m_s);
+        let turned = loops.angular.step(rate, off_rad, target_rate);
+        saturation.tick(&moved, &turned);
+        state = reach(moved.velocity, turned.velocity);
+        (velocity, rate) = (moved.velocity, turned.velocity);
+        target = next;
+    }
+    states.push(state);
+    saturation.run(states)
 }
 
 /// Measures the intervals at each limit.
@@ -169,7 +252,13 @@ impl SaturationTimer {
         }
     }
 
-    fn tick(&mut self, limited: [bool; 4]) {
+    fn tick(&mut self, moved: &Step, turned: &Step) {
+        let limited = [
+            moved.velocity_limited,
+            moved.acceleration_limited,
+            turned.velocity_limited,
+            turned.acceleration_limited,
+        ];
         for (k, limited) in limited.into_iter().enumerate() {
             if !limited {
                 self.end(k);
@@ -208,9 +297,10 @@ impl SaturationTimer {
         self.saturation_intervals.truncate(MAX_INTERVALS);
     }
 
-    fn finished(&mut self) -> Vec<SaturationInterval> {
+    /// The result with these states.
+    fn run(mut self, states: Vec<BodyState>) -> PlantRun {
         (0..Limit::ALL.len()).for_each(|k| self.end(k));
         self.keep_longest();
-        std::mem::take(&mut self.saturation_intervals)
+        PlantRun { states, saturation: self.longest, saturation_intervals: self.saturation_intervals }
     }
 }

@@ -1,5 +1,4 @@
-//! The reference of the plant: the interpolated log, sampled half-way between control ticks and smoothed
-//! without lag.
+//! The reference of the plant: the interpolated log, sampled at equal steps and smoothed without lag.
 
 use glam::{DQuat, DVec3, DVec4};
 
@@ -66,18 +65,54 @@ impl<'a> LogInterpolator<'a> {
     }
 }
 
-/// Positions and attitudes at the middles of control intervals, as coefficients of a uniform quadratic
-/// B-spline. At tick k the position is the mean of coefficients k and k + 1, and the velocity their
-/// difference over the step. A double integrator that starts on such a reference, with sufficient
+/// Curve whose coefficients a reference has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Curve {
+    /// Uniform quadratic B-spline, coefficients at the middles of control intervals: constant accelerations between
+    /// ticks.
+    Quadratic,
+    /// Uniform cubic B-spline, coefficients at the ticks and one before and after: accelerations that are linear
+    /// between ticks.
+    Cubic,
+}
+
+impl Curve {
+    /// Coefficients beyond the number of ticks.
+    fn more(self) -> usize {
+        match self {
+            Self::Quadratic => 1,
+            Self::Cubic => 2,
+        }
+    }
+
+    /// Steps from the first coefficient to the first tick.
+    fn lead(self) -> f64 {
+        0.5 * self.more() as f64
+    }
+}
+
+/// Places of a reference: from an instant on, at equal steps, for a number of control ticks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ticks {
+    pub(crate) curve: Curve,
+    pub(crate) start_s: f64,
+    pub(crate) step_s: f64,
+    pub(crate) count: usize,
+}
+
+/// Positions and attitudes as coefficients of a B-spline. A plant that starts on such a reference, with sufficient
 /// acceleration, stays on it exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct Reference {
+    pub(crate) curve: Curve,
     pub(crate) step_s: f64,
     pub(crate) position_ned_m: Vec<DVec3>,
     pub(crate) ned_from_body: Vec<DQuat>,
 }
 
-/// Target of the plant at a control tick.
+/// Target of the plant at a control tick: where it shall be, and the velocity and body rate from which it shall
+/// accelerate further: at the tick itself with a quadratic curve, with a cubic one the difference between the
+/// coefficients at this tick and the next over the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Target {
     pub(crate) position_ned_m: DVec3,
@@ -87,60 +122,53 @@ pub(crate) struct Target {
 }
 
 impl Reference {
-    /// The interpolated log at the `count` instants `start_s + (k - 1/2) step_s`.
-    pub(crate) fn sampled(log: &mut LogInterpolator<'_>, start_s: f64, step_s: f64, count: usize) -> Self {
-        Self::sampled_from(log, start_s, step_s, 0, count)
+    /// The interpolated log at the instants of the coefficients.
+    pub(crate) fn sampled(log: &mut LogInterpolator<'_>, ticks: Ticks) -> Self {
+        Self::sampled_from(log, ticks, 0)
     }
 
-    fn sampled_from(
-        log: &mut LogInterpolator<'_>,
-        start_s: f64,
-        step_s: f64,
-        before: usize,
-        count: usize,
-    ) -> Self {
+    /// With `margin` more coefficients before and after.
+    fn sampled_from(log: &mut LogInterpolator<'_>, ticks: Ticks, margin: usize) -> Self {
+        let Ticks { curve, start_s, step_s, count } = ticks;
+        let count = count + curve.more() + 2 * margin;
         let (mut position_ned_m, mut ned_from_body) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let mut previous = DQuat::IDENTITY;
         for k in 0..count {
-            let (position, attitude) = log.reflected(start_s + (k as f64 - before as f64 - 0.5) * step_s);
+            let (position, attitude) =
+                log.reflected(start_s + (k as f64 - margin as f64 - curve.lead()) * step_s);
             // q and -q are the same attitude; the one nearer to its neighbour can be averaged with it.
             previous = if k > 0 && previous.dot(attitude) < 0.0 { -attitude } else { attitude };
             position_ned_m.push(position);
             ned_from_body.push(previous);
         }
-        Self { step_s, position_ned_m, ned_from_body }
+        Self { curve, step_s, position_ned_m, ned_from_body }
     }
 
     /// The log smoothed by four successive moving averages, which together approximate a Gaussian of
     /// `sigma_s` without a shift in time.
-    pub(crate) fn smoothed(
-        log: &mut LogInterpolator<'_>,
-        start_s: f64,
-        step_s: f64,
-        count: usize,
-        sigma_s: f64,
-    ) -> Self {
+    pub(crate) fn smoothed(log: &mut LogInterpolator<'_>, ticks: Ticks, sigma_s: f64) -> Self {
+        let Ticks { curve, step_s, .. } = ticks;
         // The variance of a moving average over 2 h + 1 ticks is h (h + 1) / 3 ticks^2; those of the four add
         // up to sigma^2.
         let ticks2 = (sigma_s / step_s).powi(2);
         let half = ((0.25 + 0.75 * ticks2).sqrt() - 0.5).round().max(0.0) as usize;
-        let raw = Self::sampled_from(log, start_s, step_s, PASSES * half, count + 2 * PASSES * half);
+        let raw = Self::sampled_from(log, ticks, PASSES * half);
         let (mut position, mut attitude) = (raw.position_ned_m, raw.ned_from_body);
         rayon::join(
             || (0..PASSES).for_each(|_| moving_average(&mut position, half)),
             || (0..PASSES).for_each(|_| average_attitude(&mut attitude, half)),
         );
-        Self { step_s, position_ned_m: position, ned_from_body: attitude }
+        Self { curve, step_s, position_ned_m: position, ned_from_body: attitude }
     }
 
     /// Number of control ticks.
     pub(crate) fn ticks(&self) -> usize {
-        self.position_ned_m.len() - 1
+        self.position_ned_m.len() - self.curve.more()
     }
 
     /// Lengths of the accelerations, m/s^2 and rad/s^2, at a rank from 0 (the smallest) to 1 (the largest).
     pub(crate) fn accelerations(&self, rank: f64) -> [f64; 2] {
-        let inner = 1..self.ticks();
+        let inner = 1..self.position_ned_m.len() - 1;
         let stride = inner.len() / MAX_RANKED + 1;
         let rate = 1.0 / (self.step_s * self.step_s);
         let linear = |k: usize| {
@@ -155,15 +183,41 @@ impl Reference {
 
     /// Target at tick `k`, below [`Self::ticks`].
     pub(crate) fn target(&self, k: usize) -> Target {
-        let (x0, x1) = (self.position_ned_m[k], self.position_ned_m[k + 1]);
-        let (q0, q1) = (self.ned_from_body[k], self.ned_from_body[k + 1]);
-        let turn = so3::log(q0.inverse() * q1);
-        Target {
-            position_ned_m: 0.5 * (x0 + x1),
-            velocity_ned_m_s: (x1 - x0) / self.step_s,
-            ned_from_body: q0 * so3::exp(0.5 * turn),
-            rate_body_rad_s: turn / self.step_s,
+        let turn = |k: usize| so3::log(self.ned_from_body[k].inverse() * self.ned_from_body[k + 1]);
+        let (x0, x1, q0) = (self.position_ned_m[k], self.position_ned_m[k + 1], self.ned_from_body[k]);
+        match self.curve {
+            Curve::Quadratic => {
+                let turn = turn(k);
+                Target {
+                    position_ned_m: 0.5 * (x0 + x1),
+                    velocity_ned_m_s: (x1 - x0) / self.step_s,
+                    ned_from_body: q0 * so3::exp(0.5 * turn),
+                    rate_body_rad_s: turn / self.step_s,
+                }
+            }
+            Curve::Cubic => {
+                let x2 = self.position_ned_m[k + 2];
+                // Both turns have the same components in the axes of the attitude between them.
+                let (before, after) = (turn(k), turn(k + 1));
+                Target {
+                    position_ned_m: x1 + (x0 - 2.0 * x1 + x2) / 6.0,
+                    velocity_ned_m_s: (x2 - x1) / self.step_s,
+                    ned_from_body: self.ned_from_body[k + 1] * so3::exp((after - before) / 6.0),
+                    rate_body_rad_s: after / self.step_s,
+                }
+            }
         }
+    }
+
+    /// Makes a cubic curve end without accelerations.
+    pub(crate) fn with_resting_ends(mut self) -> Self {
+        let last = self.position_ned_m.len() - 1;
+        for [end, next, after] in [[0, 1, 2], [last, last - 1, last - 2]] {
+            self.position_ned_m[end] = 2.0 * self.position_ned_m[next] - self.position_ned_m[after];
+            let (at, inward) = (self.ned_from_body[next], self.ned_from_body[after]);
+            self.ned_from_body[end] = (at * inward.inverse() * at).normalize();
+        }
+        self
     }
 }
 
@@ -223,6 +277,10 @@ mod tests {
         }
     }
 
+    fn ticks(curve: Curve, step_s: f64, count: usize) -> Ticks {
+        Ticks { curve, start_s: 0.0, step_s, count }
+    }
+
     #[test]
     fn looks_up_forward_backward_and_outside() {
         let rows: Vec<_> = (0..50).map(|i| row(f64::from(i), f64::from(i * i), 0.1 * f64::from(i))).collect();
@@ -250,7 +308,7 @@ mod tests {
         let rows: Vec<_> =
             (0..9).map(|i| row(0.5 * f64::from(i), 3.0 * f64::from(i), 0.7 * f64::from(i))).collect();
         let mut log = LogInterpolator::new(&rows).unwrap();
-        let reference = Reference::smoothed(&mut log, 0.0, 0.01, 402, 0.1);
+        let reference = Reference::smoothed(&mut log, ticks(Curve::Quadratic, 0.01, 401), 0.1);
         for k in [0, 1, 200, 399, 400] {
             let target = reference.target(k);
             assert!((target.position_ned_m.x - 0.06 * k as f64).abs() < 1e-9);
@@ -267,7 +325,7 @@ mod tests {
         let rows: Vec<_> =
             (0..4001).map(|i| row(0.001 * f64::from(i), (0.001 * f64::from(i) - 2.0).powi(2), 0.0)).collect();
         let mut log = LogInterpolator::new(&rows).unwrap();
-        let reference = Reference::smoothed(&mut log, 0.0, 0.001, 4001, 0.1);
+        let reference = Reference::smoothed(&mut log, ticks(Curve::Quadratic, 0.001, 4000), 0.1);
         let gained = reference.position_ned_m[2000].x - (2000.0 * 0.001 - 0.0005 - 2.0f64).powi(2);
         // The half width is a whole number of ticks: 1 % at 1 ms.
         assert!((gained - 0.01).abs() < 2e-4, "{gained}");

@@ -1,14 +1,14 @@
 //! Spline planner. The whole log is known, so the reference can be the closest motion that the plant can
 //! follow.
 //!
-//! A uniform quadratic B-spline has constant acceleration between ticks, exactly what the plant can produce.
-//! Its coefficients c minimise
+//! The acceleration of a uniform cubic B-spline is linear between ticks and does not jump. Its coefficients c
+//! minimise
 //!
 //! ```text
-//! sum_k |(c_(k-1) + 6 c_k + c_(k+1))/8 - r_k|^2 + sum_k lambda_k |(c_(k-1) - 2 c_k + c_(k+1))/h^2|^2
+//! sum_k |(c_(k-1) + 4 c_k + c_(k+1))/6 - r_k|^2 + sum_k lambda_k |(c_(k-1) - 2 c_k + c_(k+1))/h^2|^2
 //! ```
 //!
-//! where r is the log half-way between ticks. lambda starts as a constant and is raised where the
+//! where r is the log at the ticks. lambda starts as a constant and is raised where the
 //! acceleration exceeds its limit, until it does so nowhere. The normal equations have five diagonals.
 //! Attitude is treated in the same way with rotation vectors relative to the smoothed log, where they are
 //! small.
@@ -50,7 +50,8 @@ pub(crate) fn plan_spline(raw: &Reference, smoothed: Reference, limits: &Resolve
         corrections(&residual, &second, limits.max_angular_acceleration_rad_s2 * h2, raw.step_s)
     };
     let (shifts, turns) = rayon::join(position, attitude);
-    Reference {
+    let planned = Reference {
+        curve: smoothed.curve,
         step_s: smoothed.step_s,
         position_ned_m: smoothed.position_ned_m.iter().zip(&shifts).map(|(at, shift)| *at + *shift).collect(),
         ned_from_body: smoothed
@@ -59,7 +60,8 @@ pub(crate) fn plan_spline(raw: &Reference, smoothed: Reference, limits: &Resolve
             .zip(&turns)
             .map(|(at, turn)| (*at * so3::exp(*turn)).normalize())
             .collect(),
-    }
+    };
+    planned.with_resting_ends()
 }
 
 /// `difference(k, k+1) - difference(k-1, k)` for inner k, zero at both ends.
@@ -177,8 +179,8 @@ impl BandedFit {
             self.solution[k] += residual[k];
         }
         for k in 1..count.saturating_sub(1) {
-            // The base's own value of the spline half-way between ticks is base + second/8.
-            self.add(k, [0.125, 0.75, 0.125], 1.0, residual[k] - 0.125 * second[k]);
+            // The base's own value of the spline at a tick is base + second/6.
+            self.add(k, [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], 1.0, residual[k] - second[k] / 6.0);
             self.add(k, [1.0, -2.0, 1.0], weights[k], -second[k]);
         }
     }
@@ -204,7 +206,7 @@ mod tests {
         let cost = |d: &[DVec3]| {
             let inner: f64 = (1..count - 1)
                 .map(|k| {
-                    let value = (d[k - 1] + 6.0 * d[k] + d[k + 1]) / 8.0 + 0.125 * second[k] - residual[k];
+                    let value = (d[k - 1] + 4.0 * d[k] + d[k + 1] + second[k]) / 6.0 - residual[k];
                     let bend = d[k - 1] - 2.0 * d[k] + d[k + 1] + second[k];
                     value.length_squared() + weights[k] * bend.length_squared()
                 })

@@ -70,10 +70,14 @@ fn row(t_s: f64, position_ned_m: DVec3, ned_from_body: DQuat) -> LogRow {
     LogRow { t_s, position_ned_m, ned_from_body }
 }
 
-/// Checks all four limits, as lengths of vectors, at every tick and in between (where lengths are convex).
+/// Checks all four limits, as lengths of vectors, at every tick and at four instants of every interval.
 fn assert_limits_kept(tracked: &TrackResult) {
-    let limits = &tracked.limits;
-    for state in tracked.trajectory.knots() {
+    let (limits, trajectory) = (&tracked.limits, &tracked.trajectory);
+    let instants = (0..trajectory.segments()).flat_map(|k| {
+        let [from_s, to_s] = [k, k + 1].map(|k| trajectory.knot_s(k));
+        (0..5).map(move |i| from_s + (to_s - from_s) * 0.2 * f64::from(i))
+    });
+    for state in instants.map(|t_s| trajectory.state(t_s)).chain(trajectory.knots().iter().copied()) {
         assert!(state.velocity_ned_m_s.length() <= limits.max_speed_m_s * (1.0 + 1e-12));
         assert!(state.acceleration_ned_m_s2.length() <= limits.max_acceleration_m_s2);
         assert!(state.rate_body_rad_s.length() <= limits.max_angular_rate_rad_s * (1.0 + 1e-12));
@@ -85,7 +89,12 @@ fn assert_limits_kept(tracked: &TrackResult) {
 /// and rate.
 fn assert_joined(trajectory: &Trajectory) {
     let knots = trajectory.knots();
+    let is_smooth = trajectory.is_smooth();
     for k in 1..knots.len() {
+        if is_smooth {
+            assert_smooth(trajectory, k);
+            continue;
+        }
         let end = crate::trajectory::advance(&knots[k - 1], trajectory.knot_s(k) - trajectory.knot_s(k - 1));
         // Rounding of kilometres and of 20 minutes of seconds, with velocities of up to 1 km/s.
         assert!((end.position_ned_m - knots[k].position_ned_m).length() < 1e-8, "{k}");
@@ -93,6 +102,38 @@ fn assert_joined(trajectory: &Trajectory) {
         assert!(so3::log(end.ned_from_body.inverse() * knots[k].ned_from_body).length() < 1e-9, "{k}");
         assert!((end.rate_body_rad_s - knots[k].rate_body_rad_s).length() < 1e-9, "{k}");
     }
+}
+
+/// Checks that all derivatives up to the accelerations join at a knot, where the motion is a double integrator of
+/// accelerations that are linear in time: integrated by Simpson's rule, which is exact for them.
+fn assert_smooth(trajectory: &Trajectory, k: usize) {
+    let (knots, step_s) = (trajectory.knots(), trajectory.knot_s(k) - trajectory.knot_s(k - 1));
+    let (from, to) = (&knots[k - 1], &knots[k]);
+    let middle = trajectory.state(trajectory.knot_s(k - 1) + 0.5 * step_s);
+    let simpson = |a: DVec3, b: DVec3, c: DVec3| (a + 4.0 * b + c) * (step_s / 6.0);
+    let gained = [
+        simpson(from.velocity_ned_m_s, middle.velocity_ned_m_s, to.velocity_ned_m_s),
+        simpson(from.acceleration_ned_m_s2, middle.acceleration_ned_m_s2, to.acceleration_ned_m_s2),
+        simpson(
+            from.angular_acceleration_body_rad_s2,
+            middle.angular_acceleration_body_rad_s2,
+            to.angular_acceleration_body_rad_s2,
+        ),
+    ];
+    // Rounding of the times of 20 minutes, with velocities of up to 1 km/s.
+    assert!((from.position_ned_m + gained[0] - to.position_ned_m).length() < 1e-8, "{k}");
+    assert!((from.velocity_ned_m_s + gained[1] - to.velocity_ned_m_s).length() < 1e-8, "{k}");
+    assert!((from.rate_body_rad_s + gained[2] - to.rate_body_rad_s).length() < 1e-9, "{k}");
+    // The attitude and the accelerations are those of both intervals.
+    let near_s = 1e-7 * step_s;
+    let [before, after] = [-near_s, near_s].map(|off_s| trajectory.state(trajectory.knot_s(k) + off_s));
+    assert!(so3::log(before.ned_from_body.inverse() * after.ned_from_body).length() < 1e-7, "{k}");
+    let jumps = [
+        after.acceleration_ned_m_s2 - before.acceleration_ned_m_s2,
+        after.angular_acceleration_body_rad_s2 - before.angular_acceleration_body_rad_s2,
+    ];
+    // Within 2e-7 of a step: of at most twice the largest acceleration, 1 km/s^2.
+    assert!(jumps.iter().all(|jump| jump.length() < 1e-3), "{k}: {jumps:?}");
 }
 
 #[test]
@@ -135,7 +176,12 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
 
 /// Response to a step of 10 m (north) or 30 deg (yaw), smoothed so little that the controller limits the
 /// motion.
-fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyState>, ResolvedLimits) {
+fn step_response(
+    curve: Curve,
+    rate_hz: f64,
+    distance_m: f64,
+    angle_rad: f64,
+) -> (Vec<BodyState>, ResolvedLimits) {
     let limits = ResolvedLimits {
         max_speed_m_s: 50.0,
         max_acceleration_m_s2: 19.6,
@@ -145,6 +191,7 @@ fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyStat
     let ticks = (4.0 * rate_hz) as usize;
     let jump = ticks / 20;
     let reference = Reference {
+        curve,
         step_s: 1.0 / rate_hz,
         position_ned_m: (0..=ticks)
             .map(|k| if k > jump { DVec3::X * distance_m } else { DVec3::ZERO })
@@ -158,8 +205,12 @@ fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyStat
 
 #[test]
 fn a_step_is_taken_without_overshoot_or_chatter() {
-    for rate_hz in [50.0, 100.0, 200.0, 400.0, 1000.0] {
-        let (states, _) = step_response(rate_hz, 10.0, 0.5);
+    let curves = [Curve::Quadratic, Curve::Cubic];
+    for (curve, rate_hz) in curves
+        .into_iter()
+        .flat_map(|curve| [50.0, 100.0, 200.0, 400.0, 1000.0].map(|rate_hz| (curve, rate_hz)))
+    {
+        let (states, _) = step_response(curve, rate_hz, 10.0, 0.5);
         let accelerations = |pick: fn(&BodyState) -> f64| {
             let signs: Vec<bool> =
                 states.iter().map(pick).filter(|a| a.abs() > 1e-6).map(|a| a > 0.0).collect();

@@ -36,10 +36,14 @@ fn lever_arm_on_a_circle() {
         mount: SensorMountSpec { offset_m: [2.0, -3.0, 1.0], ..SensorMountSpec::default() },
         ..ImuSpec::default()
     };
-    for sample in imu(spec, &input).samples() {
+    // Every fourth knot is a sample's instant. There the acceleration of the segment before, which is half a step
+    // behind on average, and of the one that begins count alike.
+    let (sin, cos) = (0.5 * w * STEP_S).sin_cos();
+    // At 0 the platform stops coasting.
+    for sample in imu(spec, &input).samples().skip(1) {
         // The centre is to the right at 50 m; the arm adds its own distance to it. Up is -9.80665.
-        let expected = w * w * DVec3::new(-2.0, radius_m + 3.0, 0.0) - DVec3::Z * 9.806_65;
-        // Every fourth knot is a sample's instant.
+        let expected = w * w * (DVec3::new(-2.0, 3.0, 0.0) + radius_m * cos * DVec3::new(sin, cos, 0.0))
+            - DVec3::Z * 9.806_65;
         assert!((sample.true_accel_m_s2 - expected).length() < 1e-12, "{}", sample.true_accel_m_s2);
         assert!((sample.true_gyro_rad_s - DVec3::Z * w).length() < 1e-14);
         let from_axis_m = sample.position_ned_m.truncate().length();
@@ -50,9 +54,13 @@ fn lever_arm_on_a_circle() {
 
 #[test]
 fn angular_acceleration_acts_on_the_lever_arm() {
-    let state =
-        BodyState { angular_acceleration_body_rad_s2: DVec3::Y * 0.5, ..still(DQuat::IDENTITY).state(0.0) };
-    let trajectory = Trajectory::listed(vec![0.0], 4.0, vec![state]).unwrap();
+    // From -1 s on, so that it is level and at rest at 0.
+    let state = BodyState {
+        rate_body_rad_s: DVec3::Y * -0.5,
+        angular_acceleration_body_rad_s2: DVec3::Y * 0.5,
+        ..still(DQuat::from_rotation_y(0.25)).state(0.0)
+    };
+    let trajectory = Trajectory::listed(vec![-1.0], 4.0, vec![state]).unwrap();
     let spec = ImuSpec {
         mount: SensorMountSpec { offset_m: [2.0, 0.0, 0.0], ..SensorMountSpec::default() },
         ..ImuSpec::default()

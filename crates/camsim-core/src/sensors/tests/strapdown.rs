@@ -151,3 +151,45 @@ fn the_same_on_a_lever_arm_on_the_turning_earth() {
     let [off_m, off_deg] = errors(&samples, &gravity, DVec3::ZERO);
     assert!(off_m > 1.0 && (off_deg - 0.25).abs() < 0.1, "{off_m} m, {off_deg} deg");
 }
+
+/// Largest distance from the path, metres, of the midpoint rule over all samples, which begin on a straight line:
+/// means of the forces of two samples. Rates are integrated through four samples, since the mean of two alone turns
+/// 200 Hz into an attitude that is off by 1e-6 rad, 4 mm a minute by gravity.
+fn midpoint_error_m(samples: &[ImuSample], gravity: DVec3) -> f64 {
+    let first = &samples[0];
+    let (mut p, mut v, start) = (first.position_ned_m, first.velocity_ned_m_s, first.ned_from_sensor);
+    let mut q = [start.w, start.x, start.y, start.z];
+    let mut most_m = 0.0_f64;
+    for k in 1..samples.len() {
+        let (from, to) = (&samples[k - 1], &samples[k]);
+        let [before, after] = [k.saturating_sub(2), (k + 1).min(samples.len() - 1)].map(|k| &samples[k]);
+        let h = to.time.t_s - from.time.t_s;
+        let (inner, outer) = (from.gyro_rad_s + to.gyro_rad_s, before.gyro_rad_s + after.gyro_rad_s);
+        // The product of both rates is what a rotation vector has beside the integral of the rate (coning).
+        let turn = h / 24.0 * (13.0 * inner - outer) + h * h / 12.0 * from.gyro_rad_s.cross(to.gyro_rad_s);
+        let half = 0.5 * turn.length();
+        let axis = if half > 0.0 { turn / (2.0 * half) } else { DVec3::ZERO };
+        let next = times(q, [half.cos(), half.sin() * axis.x, half.sin() * axis.y, half.sin() * axis.z]);
+        let a = 0.5 * (rotated(q, from.accel_m_s2) + rotated(next, to.accel_m_s2)) + gravity;
+        p += h * (v + 0.5 * h * a);
+        v += h * a;
+        q = next;
+        most_m = most_m.max((p - to.position_ned_m).length());
+    }
+    most_m
+}
+
+#[test]
+fn a_minute_of_samples_at_usual_rates_returns_the_path() {
+    // The rate of `sqrt` has a bend at every tick: integrated as a smooth one it turns by up to 5e-7 rad less.
+    for (kind, most_m) in [(TrackerKind::Spline, 1e-3), (TrackerKind::Sqrt, 2e-3)] {
+        let input = input(flown_by(kind, 40.0, 60.0), None, [-1.0, 61.0]);
+        for rate_hz in [200.0, 400.0] {
+            let samples: Vec<ImuSample> =
+                imu(ImuSpec { rate_hz, ..ImuSpec::default() }, &input).samples().collect();
+            assert_eq!(samples.len(), (62.0 * rate_hz) as usize + 1);
+            let off_m = midpoint_error_m(&samples, DVec3::new(0.0, 0.0, 9.806_65));
+            assert!(off_m < most_m, "{kind:?} at {rate_hz} Hz: {off_m} m");
+        }
+    }
+}
