@@ -66,6 +66,7 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
         }
         mark_attitudes(&mut rows, &mut report);
     }
+    check_clock(&rows)?;
     merge(&mut rows, &mut report);
     if uses_log_attitude {
         fill_attitudes(&mut rows);
@@ -240,6 +241,18 @@ fn mark_attitudes(rows: &mut [CleanRow], report: &mut CleaningReport) {
         report.attitude_glitches.add(row.line);
         row.attitude = Attitude::Missing;
     }
+}
+
+/// Refuses rows of one time at several places: their mean would stand still where nothing was.
+fn check_clock(rows: &[CleanRow]) -> Result<(), LogError> {
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
+    let span_ns = i128::from(last.t_ns) - i128::from(first.t_ns);
+    let distance_m =
+        rows.iter().map(|row| row.position_ned_m.distance(first.position_ned_m)).fold(0.0, f64::max);
+    if span_ns >= MERGE_NS || distance_m <= SPIKE_FLOOR_M {
+        return Ok(());
+    }
+    Err(LogError::AllTimesEqual { rows: rows.len(), line: first.line, distance_m })
 }
 
 /// Averages groups of rows within 1 ms of the group's first row.
