@@ -51,8 +51,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
         .map_err(|text| problem([&[text][..], &topics.damage].concat().join("; ")))?;
     let mut notes: Vec<Note> = topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
     notes.extend(unused_height_note(spec));
-    let tree = Tree::new(&topics);
-    let samples = turned(&mut topics, &tree, &key, kind, &mut notes).map_err(problem)?;
+    let samples = turned(&topics, &key, kind, &mut notes).map_err(problem)?;
     let is_geodetic = kind == RosKind::NavSatFix;
     let imu = if !is_geodetic && attitude_name.is_none() || spec.attitude == AttitudeSource::Track {
         None
@@ -69,7 +68,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
         Some(other) if other == key => Some(stream(&key, &samples, true, &mut notes)),
         Some(other) => {
             let kind = topics.kinds.get(&other).copied().unwrap_or(RosKind::Imu);
-            let samples = turned(&mut topics, &tree, &other, kind, &mut notes).map_err(problem)?;
+            let samples = turned(&topics, &other, kind, &mut notes).map_err(problem)?;
             Some(stream(&other, &samples, true, &mut notes))
         }
     };
@@ -79,22 +78,25 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     Streams { frame, kind, position, attitude, notes }.into_log(path, spec)
 }
 
-/// Takes the samples of a topic, in the root of their transforms and in camsim's axes.
+/// The samples of a topic, in the root of their transforms and in camsim's axes.
 fn turned(
-    topics: &mut Topics,
-    tree: &Tree,
+    topics: &Topics,
     key: &TopicKey,
     kind: RosKind,
     notes: &mut Vec<Note>,
 ) -> Result<Vec<Sample>, String> {
     let name = key.to_string();
-    let mut samples = topics.samples.remove(key).unwrap_or_default();
+    let mut samples = topics.samples.get(key).cloned().unwrap_or_default();
+    let tree = Tree::new(topics, &key.topic);
+    let Some(first) = samples.first() else { return Ok(samples) };
+    let (frame, child) = (first.frame.clone(), first.child.clone());
     match kind {
         RosKind::Transforms => tree.compose(&name, &mut samples, notes)?,
-        RosKind::NavSatFix | RosKind::Imu => {}
+        // Their headers name the sensor.
+        RosKind::NavSatFix | RosKind::Imu => notes.extend(tree.mount_note(&name, &frame)),
         _ => {
-            let frame = samples.first().map(|sample| sample.frame.clone()).unwrap_or_default();
             notes.extend(tree.unused_parent_note(&name, &frame, topics));
+            notes.extend(child.and_then(|child| tree.mount_note(&name, &child)));
         }
     }
     frames::turn(&name, kind, &mut samples, notes)?;

@@ -35,22 +35,10 @@ pub(super) struct Header {
     pub(super) notes: Vec<Note>,
 }
 
-/// A header record: its subject of three letters, the rest of its key, and its value.
-struct Record<'a> {
-    subject: String,
-    key: &'a str,
-    value: &'a str,
-}
-
-impl<'a> Record<'a> {
-    /// Parses `HFDTM100GPSDATUM:WGS-1984`: source, subject, key, value.
-    fn parse(line: &'a str) -> Option<Self> {
-        let is_source = matches!(line.as_bytes(), [b'H' | b'h', b'F' | b'O' | b'P' | b'f' | b'o' | b'p', ..]);
-        let subject = line.get(2..5).filter(|_| is_source)?.to_ascii_uppercase();
-        let rest = line.get(5..)?;
-        let (key, value) = rest.split_once(':').unwrap_or(("", rest));
-        Some(Self { subject, key: key.trim(), value: value.trim() })
-    }
+/// Subject, as `DTM`, and what stands behind it, of a record such as `HFDTM100GPSDATUM:WGS-1984`.
+fn parse(line: &str) -> Option<(String, &str)> {
+    let is_header = matches!(line.as_bytes(), [b'H' | b'h', b'F' | b'O' | b'P' | b'f' | b'o' | b'p', ..]);
+    Some((line.get(2..5).filter(|_| is_header)?.to_ascii_uppercase(), line.get(5..)?))
 }
 
 impl Header {
@@ -59,17 +47,18 @@ impl Header {
     /// # Errors
     /// It is a date that cannot be read.
     pub(super) fn read(&mut self, line: &str, number: usize) -> Result<(), String> {
-        let Some(record) = Record::parse(line) else { return Ok(()) };
-        let letters: String = record.value.chars().filter(char::is_ascii_alphanumeric).collect();
+        let Some((subject, rest)) = parse(line) else { return Ok(()) };
+        let letters: String = rest.chars().filter(char::is_ascii_alphanumeric).collect();
         let letters = letters.to_ascii_uppercase();
-        match record.subject.as_str() {
-            "DTE" => self.date(&record, line, number)?,
-            "DTM" => self.datum(&record, &letters, line, number),
+        match subject.as_str() {
+            "DTE" => self.date(rest, line, number)?,
+            "DTM" => self.datum(&letters, line, number),
             "ALG" => self.gnss_height(&letters, line, number),
             "ALP" => {
-                let is_known = ["", "ISA", "STANDARD", "STD", "NIL", "NKN"].contains(&strip(&letters, "ALTPRESSURE"));
                 // Some loggers write the setting of 1013.25 hPa for the standard atmosphere.
-                let is_standard = is_known || letters.contains("101325") || letters.contains("ISA");
+                let standard = ["ISA", "STANDARD", "STD", "101325", "NIL", "NKN"];
+                let value = strip(&letters, "ALTPRESSURE");
+                let is_standard = value.is_empty() || standard.iter().any(|word| value.contains(word));
                 self.pressure = (!is_standard).then(|| (number, line.to_owned()));
             }
             "TZN" => self.note(
@@ -91,58 +80,38 @@ impl Header {
         self.notes.push(Note { is_warning, text });
     }
 
-    fn date(&mut self, record: &Record<'_>, line: &str, number: usize) -> Result<(), String> {
-        let text = record.value.trim_start_matches(|c: char| !c.is_ascii_digit());
+    fn date(&mut self, rest: &str, line: &str, number: usize) -> Result<(), String> {
+        let text = rest.trim_start_matches(|c: char| !c.is_ascii_digit());
         let text = text.split([',', ' ', ';']).next().unwrap_or("");
-        if !text.is_empty() && text.bytes().all(|byte| byte == b'0') || record.value.is_empty() {
-            let text = format!("line {number}: `{line}` states no date: times count from midnight");
-            self.note(true, text);
+        if text.bytes().all(|byte| byte == b'0') {
+            self.note(true, format!("line {number}: `{line}` states no date: times count from midnight"));
             return Ok(());
         }
+        let day_ns = date_ns(text);
         self.day_ns = Some(
-            date_ns(text)
-                .ok_or_else(|| format!("`{line}` is no date such as HFDTE010523 (day, month, year)"))?,
+            day_ns.ok_or_else(|| format!("`{line}` is no date such as HFDTE010523 (day, month, year)"))?,
         );
         Ok(())
     }
 
-    fn datum(&mut self, record: &Record<'_>, letters: &str, line: &str, number: usize) {
-        // `100GPSDATUM:WGS84`, `100:WGS84`, `GPSDATUM:WGS84`, and `100` or `WGS84` alone.
-        let digits: String = (if record.key.is_empty() { letters } else { record.key })
-            .chars()
-            .take_while(char::is_ascii_digit)
-            .collect();
-        let name = if record.key.is_empty() { &letters[digits.len()..] } else { letters };
-        let name = ["GPSDATUM", "DATUM"].iter().fold(name, |name, key| strip(name, key));
-        let code = digits.parse::<u32>().ok();
-        // A value of digits only repeats the code.
-        let (name, code) = match name.parse::<u32>() {
-            Ok(code) => ("", Some(code)),
-            Err(_) => (name, code),
-        };
-        if name.is_empty() {
-            if code.is_some_and(|code| code != 100) {
-                self.note(
-                    true,
-                    format!(
-                        "line {number}: `{line}` names a datum by its code, and 100 is WGS 84: the positions are \
-                            taken as WGS 84, which may place them hundreds of metres off; convert them if they are \
-                            not"
-                    ),
-                );
-            }
-            return;
+    /// Takes `100GPSDATUMWGS84`, where the number, the key or the name may be missing.
+    fn datum(&mut self, letters: &str, line: &str, number: usize) {
+        let name = letters.trim_start_matches(|c: char| c.is_ascii_digit());
+        let code = &letters[..letters.len() - name.len()];
+        let name = strip(strip(name, "GPS"), "DATUM");
+        // The number of the datum may stand in the place of its name.
+        let (code, name) = if name.parse::<u32>().is_ok() { (name, "") } else { (code, name) };
+        let is_known = if name.is_empty() { ["", "100"].contains(&code) } else { is_wgs84(name) };
+        if !is_known {
+            self.note(
+                true,
+                format!(
+                    "line {number}: `{line}` names another datum than WGS 84 (100): the positions are taken as \
+                        WGS 84, which may place them hundreds of metres off; set the logger to WGS 84, or convert \
+                        the positions"
+                ),
+            );
         }
-        if is_wgs84(name) {
-            return;
-        }
-        self.note(
-            true,
-            format!(
-                "line {number}: `{line}` names another datum than WGS 84: the positions are taken as WGS 84, which \
-                    may place them hundreds of metres off; set the logger to WGS 84, or convert the positions"
-            ),
-        );
     }
 
     fn gnss_height(&mut self, letters: &str, line: &str, number: usize) {
@@ -173,8 +142,8 @@ fn is_wgs84(name: &str) -> bool {
     let same =
         ["WGS84", "WGS1984", "WORLDGEODETICSYSTEM1984", "WORLDGEODETICSYSTEM84", "EPSG4326", "EPSG4979"];
     let near = ["ETRS89", "ETRF", "ITRF", "GDA94", "GDA2020", "NZGD2000", "PZ90"];
-    // `WGS 84 (G1762)`, `WGS-1984 DEFAULT`, and `84` or `W84` of short displays.
-    name == "WGS" || name == "84" || name == "W84" || same.iter().chain(&near).any(|word| name.contains(word))
+    // As part of `WGS 84 (G1762)`, too.
+    name == "WGS" || same.iter().chain(&near).any(|word| name.contains(word))
 }
 
 /// Nanoseconds since 1970 of day, month and year as `010523`, `01052023`, `01-05-23` or `2023-05-01`.

@@ -18,24 +18,9 @@ const USUAL_BODY: Axes = Axes(*b"flu");
 const NORTH_EAST_DOWN: Axes = Axes(*b"frd");
 const OPTICAL: Axes = Axes(*b"rdf");
 
-/// Words of frames that move with the vehicle.
-const VEHICLE_WORDS: [&str; 15] = [
-    "base",
-    "baselink",
-    "body",
-    "camera",
-    "cam",
-    "cam0",
-    "cam1",
-    "imu",
-    "lidar",
-    "laser",
-    "velodyne",
-    "gps",
-    "fcu",
-    "footprint",
-    "optical",
-];
+/// Words of frames that move with the vehicle, without numbers behind them.
+const VEHICLE_WORDS: [&str; 10] =
+    ["base", "baselink", "body", "camera", "cam", "imu", "lidar", "gps", "fcu", "optical"];
 /// Words of frames that do not, whatever else their names say: `camera_init`, `camera_odom_frame`.
 const WORLD_WORDS: [&str; 8] = ["map", "odom", "world", "local", "origin", "init", "earth", "global"];
 
@@ -124,7 +109,9 @@ fn words(name: &str) -> Vec<String> {
 /// Whether a frame moves with the vehicle, by its name.
 fn is_of_vehicle(name: &str) -> bool {
     let words = words(name);
-    let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
+    let has = |list: &[&str]| {
+        words.iter().any(|word| list.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit())))
+    };
     has(&VEHICLE_WORDS) && !has(&WORLD_WORDS)
 }
 

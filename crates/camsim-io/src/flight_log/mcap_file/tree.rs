@@ -49,35 +49,44 @@ impl Link {
         self.is_static || self.poses.len() == 1
     }
 
-    /// Whether the frame lies in its parent without motion or turn.
+    /// Whether the frame lies elsewhere than the origin of its parent.
+    fn moves(&self) -> bool {
+        self.poses.iter().any(|(_, position, _)| position.length() > NO_MOTION_M)
+    }
+
+    /// Whether the frame is turned in its parent.
+    fn turns(&self) -> bool {
+        self.poses.iter().any(|(.., rotation)| rotation.angle_between(DQuat::IDENTITY) > NO_TURN_RAD)
+    }
+
     fn is_identity(&self) -> bool {
-        self.poses.iter().all(|(_, position, rotation)| {
-            position.length() < NO_MOTION_M && rotation.angle_between(DQuat::IDENTITY) < NO_TURN_RAD
-        })
+        !self.moves() && !self.turns()
     }
 
     /// Whether it only turns axes about, as `map` and `map_ned`.
     fn turns_axes_only(&self, child: &str) -> bool {
-        frames::states_axes(child)
-            && self.is_constant()
-            && self.poses.iter().all(|(_, position, _)| position.length() < NO_MOTION_M)
+        frames::states_axes(child) && self.is_constant() && !self.moves()
     }
 }
 
-/// All transforms of a file.
+/// The transforms of a vehicle.
 #[derive(Debug, Default)]
 pub(super) struct Tree {
     links: BTreeMap<Arc<str>, Link>,
 }
 
 impl Tree {
-    pub(super) fn new(topics: &Topics) -> Self {
+    /// Those that concern a topic: `/tf`, and `/uav1/tf` for `/uav1/odom`.
+    pub(super) fn new(topics: &Topics, topic: &str) -> Self {
         let mut tree = Self::default();
         for (key, samples) in &topics.samples {
-            if topics.kinds.get(key) != Some(&RosKind::Transforms) {
+            let (space, name) = key.topic.rsplit_once('/').unwrap_or(("", &key.topic));
+            let is_near =
+                topic.strip_prefix(space).is_some_and(|rest| rest.starts_with('/') || space.is_empty());
+            if topics.kinds.get(key) != Some(&RosKind::Transforms) || !is_near {
                 continue;
             }
-            let is_static = key.topic.ends_with("tf_static");
+            let is_static = name == "tf_static";
             for sample in samples {
                 let (Some(child), Some(position), Some(rotation)) =
                     (&sample.child, sample.position, sample.rotation)
@@ -138,14 +147,14 @@ impl Tree {
             // Refused later, with the names.
             return Ok(());
         }
-        let (mut way, mut outside) = (vec![frame.to_string()], 0);
+        let (mut way, mut outside) = (vec![frame.to_string()], vec![false; samples.len()]);
         while let Some((link, parent)) = self.above(&frame)? {
             if way.len() > MAX_LINKS || way.contains(&parent.to_string()) {
                 return Err(format!("the transforms above `{frame}` go in a circle"));
             }
-            for sample in samples.iter_mut() {
+            for (sample, outside) in samples.iter_mut().zip(&mut outside) {
                 let (position, rotation, is_inside) = link.at(sample.time_ns());
-                outside += usize::from(!is_inside);
+                *outside |= !is_inside;
                 sample.position =
                     sample.position.map(|p| (position + rotation * DVec3::from_array(p)).to_array());
                 sample.rotation = sample.rotation.map(|q| (rotation * DQuat::from_array(q)).to_array());
@@ -161,6 +170,7 @@ impl Tree {
             );
             notes.push(Note { is_warning: false, text });
         }
+        let outside = outside.into_iter().filter(|outside| *outside).count();
         if outside > 0 {
             let text = format!(
                 "{outside} poses of `{topic}` are before the first or after the last transform of a frame \
@@ -173,32 +183,47 @@ impl Tree {
 
     /// A warning that the frame of a topic has a pose of its own, which is not applied.
     pub(super) fn unused_parent_note(&self, topic: &str, frame: &str, topics: &Topics) -> Option<Note> {
-        let mut frame = Arc::<str>::from(frame);
-        for _ in 0..MAX_LINKS {
-            let link = self.links.get(&frame)?;
-            let parent = link.parents.first().cloned()?;
-            if !link.is_identity() && !link.turns_axes_only(&frame) {
-                let others: Vec<String> = topics
-                    .kinds
-                    .iter()
-                    .filter(|(_, kind)| **kind == RosKind::Transforms)
-                    .filter(|(key, _)| key.child.as_deref() != Some(&*frame))
-                    .map(|(key, _)| key.to_string())
-                    .collect();
-                let advice = if others.is_empty() {
-                    String::new()
-                } else {
-                    format!(": for poses in the root set flight.topic to one of: {}", others.join(", "))
-                };
-                return Some(Note {
-                    is_warning: true,
-                    text: format!(
-                        "`{topic}` is in the frame `{frame}`, whose pose in `{parent}` is not applied{advice}"
-                    ),
-                });
-            }
-            frame = parent;
-        }
-        None
+        let (frame, _, parent) = self.links_above(frame).find(|(_, link, _)| !link.is_identity())?;
+        let others: Vec<String> = topics
+            .kinds
+            .iter()
+            .filter(|(key, kind)| **kind == RosKind::Transforms && key.child.as_ref() != Some(frame))
+            .map(|(key, _)| key.to_string())
+            .collect();
+        let advice = if others.is_empty() {
+            String::new()
+        } else {
+            format!(": for poses in the root set flight.topic to one of: {}", others.join(", "))
+        };
+        let text =
+            format!("`{topic}` is in the frame `{frame}`, whose pose in `{parent}` is not applied{advice}");
+        Some(Note { is_warning: true, text })
+    }
+
+    /// A note that the body of a topic is mounted in another one; a warning if it is turned there.
+    pub(super) fn mount_note(&self, topic: &str, body: &str) -> Option<Note> {
+        let (frame, link, parent) = self
+            .links_above(body)
+            .take_while(|(_, link, _)| link.is_constant())
+            .find(|(_, link, _)| !link.is_identity())?;
+        Some(Note {
+            is_warning: link.turns(),
+            text: format!(
+                "`{topic}` is of `{body}`, and the pose of `{frame}` in `{parent}` is not applied: camera.mount \
+                    counts from `{body}`"
+            ),
+        })
+    }
+
+    /// A frame and those above it, each with its pose in its parent; poses that only turn axes about, as those of
+    /// `map_ned` in `map`, are passed over.
+    fn links_above(&self, frame: &str) -> impl Iterator<Item = (&Arc<str>, &Link, &Arc<str>)> {
+        let above = |frame: &str| {
+            let (frame, link) = self.links.get_key_value(frame)?;
+            Some((frame, link, link.parents.first()?))
+        };
+        std::iter::successors(above(frame), move |(_, _, parent)| above(parent))
+            .take(MAX_LINKS)
+            .filter(|(frame, link, _)| !link.turns_axes_only(frame))
     }
 }
