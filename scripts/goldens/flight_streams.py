@@ -174,6 +174,13 @@ def bags():
     bag("odom_below_map.mcap", {
         "/odom": lambda t: odometry(t, "odom", "base_link"),
         "/tf": lambda t: transforms((t, "odom", "base_link", *pose("enu", "flu", t)), (t, "map", "odom", place, quarter))})
+    # Two vehicles whose frames have the same names.
+    bag("two_vehicles.mcap", {f"/uav{number}/tf": lambda t, at=at: transforms((t, "odom", "base_link", *in_odom(t, at)), (t, "map", "odom", place, quarter))
+                              for number, at in ((1, place), (2, place + 40.0))})
+    # A sensor that is turned on the vehicle.
+    bag("imu_mount.mcap", {
+        "/fix": fix, "/imu": lambda t: imu(t, "imu_link", "enu", "flu"),
+        "/tf_static": [(0.0, transforms((0.0, "base_link", "imu_link", np.array([0.1, 0, 0]), quarter)))]})
     # mavros: axes turned about in the transforms; `map` and `odom` are one.
     swap = xyzw(AXES["enu"].T)
     bag("mavros_axes.mcap", {
@@ -277,6 +284,17 @@ def ardupilot():
             log.write(name, us, 0, ROLL, PITCH, YAW, *(ned(t) + [off, 0, 0]))
     log.save("ekf_type_2.bin")
 
+    # Two receivers without a flag of use; the first never has a fix.
+    log = Dataflash()
+    log.define(20, "GPS", "QBBIHLLe", "TimeUS,I,Status,GMS,GWk,Lat,Lng,Alt")
+    log.define(22, "ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    for t in times():
+        us = round(t * 1e6) + 2_000_000
+        log.write("ATT", us, ROLL, PITCH, YAW)
+        for receiver in range(2):
+            log.write("GPS", us, receiver, 3 if receiver else 1, 122_418_000 + round(t * 1e3), 2260, *at(t, 0.0 if receiver else 40.0))
+    log.save("gps_no_fix.bin")
+
     # Two receivers with a flag of use, in one message; the second from 1.5 s. Then the same in two messages.
     for name, separate in (("gps_used.bin", False), ("gps2_used.bin", True)):
         log = Dataflash()
@@ -354,6 +372,12 @@ def px4():
         samples.append((us(t), 0, struct.pack("<Q2dfB", us(t), lat, lon, height, int(t > 1.95))))
     ulog("dead_reckoning.ulg", ["vehicle_global_position:uint64_t timestamp;double lat;double lon;float alt;bool dead_reckoning;",
                                 attitude_format], [("vehicle_global_position", 0), ("vehicle_attitude", 0)], samples)
+
+    # Positions whose clock stands still.
+    samples = [(us(t), 0, struct.pack("<Q2df", us(0), *at(t, 0.0))) for t in times()]
+    samples += [(us(t), 1, struct.pack("<Q", us(t)) + q) for t in times()]
+    ulog("equal_times.ulg", ["vehicle_global_position:uint64_t timestamp;double lat;double lon;float alt;", attitude_format],
+         [("vehicle_global_position", 0), ("vehicle_attitude", 0)], samples)
 
 
 if __name__ == "__main__":

@@ -279,6 +279,12 @@ fn instances_frames_and_flags_are_read_as_the_files_state_them() {
             Gives(Flight { notes: &["map -> odom"], ..LOCAL }),
         ),
         ("streams/tf_moving_parent.mcap", local_topic("/tf#base_link"), Gives(LOCAL)),
+        ("streams/two_vehicles.mcap", local_topic("/uav1/tf#base_link"), Gives(LOCAL)),
+        (
+            "streams/imu_mount.mcap",
+            glider_with_attitude(),
+            Gives(Flight { warnings: &["pose of `imu_link` in `base_link` is not applied"], ..GEODETIC }),
+        ),
         (
             "streams/odom_below_map.mcap",
             local_topic("/odom"),
@@ -320,6 +326,14 @@ fn instances_frames_and_flags_are_read_as_the_files_state_them() {
             spec(),
             Gives(Flight {
                 warnings: &["the one that the vehicle used is flown (GPS.U), 0 until 3.5 s"],
+                ..GEODETIC
+            }),
+        ),
+        (
+            "streams/gps_no_fix.bin",
+            spec(),
+            Gives(Flight {
+                warnings: &["`GPS` has the instances 0, 1, and the log does not say"],
                 ..GEODETIC
             }),
         ),
@@ -386,6 +400,11 @@ fn instances_frames_and_flags_are_read_as_the_files_state_them() {
                 warnings: &["11 of 31 positions of `vehicle_global_position` are dead reckoning"],
                 ..GEODETIC
             }),
+        ),
+        (
+            "streams/equal_times.ulg",
+            spec(),
+            Refused(&["all times of `vehicle_global_position` are equal", "no flight"]),
         ),
     ];
     let results = cases.into_iter().map(|(file, spec, expected)| {
@@ -512,6 +531,13 @@ fn fixes_units_and_prose_of_gpx_are_used_or_named() {
             Refused(&["`chains`", "line 2"]),
         ),
         (
+            "ellipsoid",
+            gpx("<metadata><desc>heights above the ellipsoid</desc></metadata>", three, &metres),
+            warned(&["flight.height = \"ellipsoid\""]),
+        ),
+        ("attribute", gpx("<trk datum=\"NAD 27\"/>", three, &metres), warned(&["names the datum NAD27"])),
+        ("no datum", gpx("<trk><name>TASK 42</name></trk>", three, &metres), Gives(all)),
+        (
             "datum",
             gpx("<metadata><desc>Datum: ED 50</desc></metadata>", three, &metres),
             warned(&["line 2: `Datum: ED 50` names the datum ED50"]),
@@ -631,6 +657,10 @@ fn all_equal_times_are_refused_and_one_place_is_not() {
     );
     let still = text(point(47.05) + &point(47.05));
     assert_eq!(read_text("a.gpx", &still, &path()).unwrap().rows.len(), 1);
+    // Some equal times may be those of a log in whole seconds, but the places are named.
+    let some = "t_s,lat_deg,lon_deg,alt_m\n5,47.05,8.31,480\n5,47.06,8.31,480\n6,47.07,8.31,480\n";
+    let report = read_text("a.csv", some, &path()).unwrap().report;
+    assert!(report.to_string().contains("averaged rows are up to 1111.8 m apart"), "{report}");
     // The same of a table.
     let table = "t_s,lat_deg,lon_deg,alt_m\n5,47.05,8.31,480\n5,47.06,8.31,480\n5,47.07,8.31,480\n";
     assert!(read_text("a.csv", table, &path()).is_err_and(|error| error.contains("all times are equal")));

@@ -268,6 +268,9 @@ fn merge(rows: &mut Vec<CleanRow>, report: &mut CleaningReport) {
                 if pair[0].t_ns == pair[1].t_ns { &mut report.duplicates } else { &mut report.merged };
             finding.add(pair[1].line);
         }
+        let apart_m =
+            group.iter().map(|row| row.position_ned_m.distance(group[0].position_ned_m)).fold(0.0, f64::max);
+        report.averaged_apart_m = report.averaged_apart_m.max(apart_m);
         let count = group.len();
         let offset_ns = group.iter().map(since_start_ns).sum::<i128>() / count as i128;
         merged.push(CleanRow {

@@ -167,14 +167,13 @@ impl Chosen<'_, '_> {
         };
         let mut readers = Vec::new();
         for Part { message, .. } in &self.parts {
-            let fix = message.column(&["Status"]).filter(|_| name.starts_with("GPS"));
             let place = place(message).ok_or_else(|| format!("`{}` has no positions", message.name))?;
-            readers.push((time_reader(message)?, place, attitude_columns(message), fix));
+            readers.push((time_reader(message)?, place, attitude_columns(message)));
         }
         let (mut rows, mut without_fix) = (Vec::with_capacity(records.len()), 0);
         for instances::Selected { number, record, part, .. } in records {
-            let (time, place, attitude, fix) = &readers[part];
-            if fix.is_some_and(|fix| fix.read(record) < 3.0) {
+            let (time, place, attitude) = &readers[part];
+            if !instances::has_fix(&self.parts[part], record) {
                 without_fix += 1;
                 continue;
             }

@@ -94,14 +94,17 @@ pub(super) fn select<'a>(
         None => Vec::new(),
     };
     let (Some((source, _)), Some(first)) = (primary, chosen.first()) else {
+        let flown =
+            all.iter().filter(|one| has_fix(&parts[one.part], one.record)).map(|one| one.instance).min();
+        let flown = flown.unwrap_or(lowest);
         notes.push(Note {
             is_warning: true,
             text: format!(
-                "`{name}` has the instances {list}, and the log does not say which the vehicle used: {lowest} is \
+                "`{name}` has the instances {list}, and the log does not say which the vehicle used: {flown} is \
                     flown; set flight.topic = \"{name}#1\" for another"
             ),
         });
-        all.retain(|selected| selected.instance == lowest);
+        all.retain(|selected| selected.instance == flown);
         return Ok(all);
     };
     let mut changes = chosen.windows(2).filter(|pair| pair[0].instance != pair[1].instance);
@@ -126,6 +129,12 @@ pub(super) fn select<'a>(
         ),
     });
     Ok(chosen)
+}
+
+/// Whether a record is none of a receiver without a fix.
+pub(super) fn has_fix(part: &Part<'_, '_>, record: &[u8]) -> bool {
+    let status = part.message.column(&["Status"]).filter(|_| part.message.name.starts_with("GPS"));
+    status.is_none_or(|status| status.read(record) >= 3.0)
 }
 
 /// Whether each record is of the instance that the vehicle used, with the name of what says so.

@@ -70,6 +70,10 @@ impl Axes {
         DQuat::from_mat3(&self.matrix())
     }
 
+    fn inverse(self) -> DQuat {
+        DQuat::from_mat3(&self.matrix().transpose())
+    }
+
     /// As `north-east-down`, or `forward-right-down`.
     fn words(self, is_world: bool) -> String {
         let word = |letter: u8| match (letter, is_world) {
@@ -192,11 +196,10 @@ pub(super) fn turn(
             inferred = None;
         }
     }
-    let (world_axes, body_axes) = (axes.0.rotation(), axes.1.rotation());
+    let (from_world, to_body) = (axes.0.rotation(), axes.1.inverse());
     for sample in samples.iter_mut() {
         sample.position = sample.position.map(|p| (axes.0.matrix() * DVec3::from_array(p)).to_array());
-        sample.rotation =
-            sample.rotation.map(|q| (world_axes * DQuat::from_array(q) * body_axes.conjugate()).to_array());
+        sample.rotation = sample.rotation.map(|q| (from_world * DQuat::from_array(q) * to_body).to_array());
     }
     notes.extend(axes_note(topic, kind, [&frame, &body], axes, inferred));
     Ok(())
@@ -236,7 +239,7 @@ fn check_world(topic: &str, frame: &str, notes: &mut Vec<Note>) -> Result<(), St
 
 /// Whether nine bodies in ten have their upper side down.
 fn is_upside_down(samples: &[Sample], (world, body): (Axes, Axes)) -> bool {
-    let (world, body) = (world.rotation(), body.rotation().conjugate());
+    let (world, body) = (world.rotation(), body.inverse());
     let rotations = samples.iter().filter_map(|sample| sample.rotation).map(DQuat::from_array);
     let (mut count, mut down) = (0_usize, 0_usize);
     for rotation in rotations {
@@ -255,7 +258,7 @@ fn axes_note(
     inferred: Option<&str>,
 ) -> Option<Note> {
     let (world_words, body_words) = (world_axes.words(true), body_axes.words(false));
-    let named = |name: &str| if name.is_empty() { "no name".to_owned() } else { format!("`{name}`") };
+    let named = |name: &str| if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
     let names = if kind == RosKind::Imu {
         named(frame)
     } else {
