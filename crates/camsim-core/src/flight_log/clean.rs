@@ -246,10 +246,9 @@ fn mark_attitudes(rows: &mut [CleanRow], report: &mut CleaningReport) {
 /// Refuses rows of one time at several places: their mean would stand still where nothing was.
 fn check_clock(rows: &[CleanRow]) -> Result<(), LogError> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
-    let span_ns = i128::from(last.t_ns) - i128::from(first.t_ns);
     let distance_m =
         rows.iter().map(|row| row.position_ned_m.distance(first.position_ned_m)).fold(0.0, f64::max);
-    if span_ns >= MERGE_NS || distance_m <= SPIKE_FLOOR_M {
+    if last.t_ns != first.t_ns || distance_m <= SPIKE_FLOOR_M {
         return Ok(());
     }
     Err(LogError::AllTimesEqual { rows: rows.len(), line: first.line, distance_m })
