@@ -149,6 +149,19 @@ pub enum LogError {
         /// Line of the first row.
         line: usize,
     },
+    /// Positions that differ, all at one time.
+    #[error(
+        "all times are equal ({rows} rows from line {line}, up to {distance_m:.1} m apart), so there is no \
+            flight: export the log with the time of each position"
+    )]
+    AllTimesEqual {
+        /// Rows with a time and a position.
+        rows: usize,
+        /// Line of the first.
+        line: usize,
+        /// Largest distance from the first, metres.
+        distance_m: f64,
+    },
     /// There are neither attitude columns nor usable attitudes.
     #[error("the log has no usable attitude; set flight.attitude = \"track\" to derive it from the track")]
     NoAttitude,

@@ -71,6 +71,7 @@ mod ulog;
 mod units;
 mod unknown_unit;
 mod unused_keys;
+mod xml_prose;
 
 use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;

@@ -66,6 +66,7 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
         }
         mark_attitudes(&mut rows, &mut report);
     }
+    check_clock(&rows)?;
     merge(&mut rows, &mut report);
     if uses_log_attitude {
         fill_attitudes(&mut rows);
@@ -242,6 +243,17 @@ fn mark_attitudes(rows: &mut [CleanRow], report: &mut CleaningReport) {
     }
 }
 
+/// Refuses rows of one time at several places: their mean would stand still where nothing was.
+fn check_clock(rows: &[CleanRow]) -> Result<(), LogError> {
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
+    let distance_m =
+        rows.iter().map(|row| row.position_ned_m.distance(first.position_ned_m)).fold(0.0, f64::max);
+    if last.t_ns != first.t_ns || distance_m <= SPIKE_FLOOR_M {
+        return Ok(());
+    }
+    Err(LogError::AllTimesEqual { rows: rows.len(), line: first.line, distance_m })
+}
+
 /// Averages groups of rows within 1 ms of the group's first row.
 fn merge(rows: &mut Vec<CleanRow>, report: &mut CleaningReport) {
     let mut merged = Vec::with_capacity(rows.len());
@@ -255,6 +267,9 @@ fn merge(rows: &mut Vec<CleanRow>, report: &mut CleaningReport) {
                 if pair[0].t_ns == pair[1].t_ns { &mut report.duplicates } else { &mut report.merged };
             finding.add(pair[1].line);
         }
+        let apart_m =
+            group.iter().map(|row| row.position_ned_m.distance(group[0].position_ned_m)).fold(0.0, f64::max);
+        report.averaged_apart_m = report.averaged_apart_m.max(apart_m);
         let count = group.len();
         let offset_ns = group.iter().map(since_start_ns).sum::<i128>() / count as i128;
         merged.push(CleanRow {

@@ -7,6 +7,9 @@ use crate::scenario::AngleKind;
 /// Number of line numbers that a [`Finding`] lists.
 pub(super) const LISTED_LINES: usize = 8;
 
+/// Averaged rows at least this far apart are none of one instant.
+const MOVED_M: f64 = 1.0;
+
 /// A note of a log's reader about the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
@@ -61,6 +64,8 @@ pub struct CleaningReport {
     pub merged: Finding,
     /// Averaged with a row of the same time.
     pub duplicates: Finding,
+    /// Largest distance between rows that were averaged, metres.
+    pub averaged_apart_m: f64,
     /// Later than the row before by more than 1 s of the log's clock.
     pub gaps: Finding,
     /// The longest step between two rows, seconds of the log's clock.
@@ -135,6 +140,13 @@ impl fmt::Display for CleaningReport {
             let lines: Vec<String> = finding.lines.iter().map(usize::to_string).collect();
             let more = if finding.count > finding.lines.len() { ", ..." } else { "" };
             write!(f, "; {} {what} (line {}{more})", finding.count, lines.join(", "))?;
+        }
+        if self.averaged_apart_m >= MOVED_M {
+            write!(
+                f,
+                "; averaged rows are up to {:.1} m apart, so their times are wrong",
+                self.averaged_apart_m
+            )?;
         }
         if self.inserted > 0 {
             write!(f, "; {} rows inserted where angles turn by more than 90 degrees", self.inserted)?;

@@ -9,8 +9,10 @@
 //! | `ATT` | `Roll`, `Pitch`, `Yaw` (deg, from true north) |
 //! | `XKQ`, `NKQ` | `Q1` to `Q4`: w, x, y, z |
 //!
-//! Without `flight.topic` the first of `POS`, `AHR2`, `XKF1`, `NKF1`, `GPS` is flown. `flight.topic` names
-//! another, as `XKF1#1` (core 1) or `GPS, AHR2`. Times are `TimeUS`, or `TimeMS` in old logs.
+//! Without `flight.topic` the first of `POS`, `XKF1`, `NKF1`, `AHR2`, `GPS` is flown (`NKF1` before `XKF1`
+//! where the parameter `AHRS_EKF_TYPE` is 2). `flight.topic` names another, as `XKF1#1` (core 1) or `GPS, AHR2`.
+//! Of several cores or receivers the one that the vehicle used is flown (`instances`). Times are `TimeUS`, or
+//! `TimeMS` in old logs.
 
 use std::path::Path;
 
@@ -28,11 +30,15 @@ use super::{
 };
 
 mod file;
+mod instances;
 
 use file::{Column, DataflashFile, Message};
+use instances::Part;
 
-/// Messages with positions, the best first.
-const POSITIONS: [&str; 5] = ["POS", "AHR2", "XKF1", "NKF1", "GPS"];
+/// Messages with positions, the best first. `AHR2` is the estimate that stands by.
+const POSITIONS: [&str; 5] = ["POS", "XKF1", "NKF1", "AHR2", "GPS"];
+/// The same where the second filter flies.
+const POSITIONS_OF_EKF2: [&str; 5] = ["POS", "NKF1", "XKF1", "AHR2", "GPS"];
 /// Degrees of latitude per metre in ArduPilot's local frame.
 const DEG_PER_M: f64 = 1e-7 / 0.011_131_884_502_145_034;
 
@@ -51,24 +57,23 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let chosen = choose(&file, position_name).map_err(problem)?;
     let mut position = chosen.stream(&file, &mut notes).map_err(problem)?;
     notes.extend(streams::height_note("heights of ArduPilot", true, spec));
-    let wants_other = attitude_name.is_some() || chosen.attitude.is_none();
+    let wants_other = attitude_name.is_some() || attitude_columns(chosen.message).is_none();
     let (attitude, kind) = if spec.attitude == AttitudeSource::Track {
         (None, AttitudeKind::None)
     } else if wants_other {
         position.rows.iter_mut().for_each(|row| row.attitude = [f64::NAN; 4]);
-        attitude_stream(&file, attitude_name).map_err(problem)?
+        attitude_stream(&file, attitude_name, &mut notes).map_err(problem)?
     } else {
         (None, AttitudeKind::Euler)
     };
     Streams { frame: Frame::Geodetic, kind, position, attitude, notes }.into_log(path, spec)
 }
 
-/// A message that is read, with the instance of it.
+/// A message that is read, with the instance of it that `flight.topic` names.
 struct Chosen<'a, 'b> {
     message: &'b Message<'a>,
-    instance: u32,
-    place: PlaceColumns,
-    attitude: Option<[Column; 3]>,
+    parts: Vec<Part<'a, 'b>>,
+    instance: Option<u32>,
 }
 
 /// Columns of a position.
@@ -85,10 +90,16 @@ fn place(message: &Message<'_>) -> Option<PlaceColumns> {
     geodetic.or_else(|| message.columns(["PN", "PE", "PD"]).map(PlaceColumns::Local))
 }
 
+/// Columns of angles.
+fn attitude_columns(message: &Message<'_>) -> Option<[Column; 3]> {
+    message.columns(["Roll", "Pitch", "Yaw"])
+}
+
 /// The message to fly: the one that `flight.topic` names, else the first of [`POSITIONS`].
 fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Chosen<'a, 'b>, String> {
     let (stem, instance) = name.map_or(("", None), streams::split_instance);
-    let names = if name.is_some() { &[stem][..] } else { &POSITIONS[..] };
+    let by_rank = if file.parameter("AHRS_EKF_TYPE") == Some(2.0) { &POSITIONS_OF_EKF2 } else { &POSITIONS };
+    let names = if name.is_some() { &[stem][..] } else { &by_rank[..] };
     for name in names {
         let Some(message) = file.find(name) else { continue };
         let Some(place) = place(message) else { continue };
@@ -96,8 +107,7 @@ fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Cho
         if matches!(place, PlaceColumns::Local(_)) && origin(file).is_none() && names.len() > 1 {
             continue;
         }
-        let instance = instance.unwrap_or_else(|| first_instance(message));
-        return Ok(Chosen { message, instance, place, attitude: message.columns(["Roll", "Pitch", "Yaw"]) });
+        return Ok(Chosen { message, parts: instances::parts(file, message), instance });
     }
     let all: Vec<&str> = file
         .all()
@@ -115,25 +125,6 @@ fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Cho
             .to_owned(),
         (None, false) => format!("flight.topic must name the positions to fly: {}", all.join(", ")),
     })
-}
-
-/// The column that counts sensors or cores.
-fn instance_column(message: &Message<'_>) -> Option<Column> {
-    message.column(&["I", "C"])
-}
-
-/// The lowest instance of a message.
-fn first_instance(message: &Message<'_>) -> u32 {
-    let Some(column) = instance_column(message) else { return 0 };
-    let lowest = message.records.iter().map(|(_, record)| column.read(record)).fold(f64::INFINITY, f64::min);
-    if lowest.is_finite() { lowest as u32 } else { 0 }
-}
-
-/// Records of one instance.
-fn of_instance<'a>(message: &Message<'a>, instance: u32) -> Vec<(usize, &'a [u8])> {
-    let column = instance_column(message);
-    let is_wanted = |record: &[u8]| column.is_none_or(|column| column.read(record) == f64::from(instance));
-    message.records.iter().copied().filter(|(_, record)| is_wanted(record)).collect()
 }
 
 /// Latitude, longitude and height of the filters' origin.
@@ -164,29 +155,30 @@ impl Chosen<'_, '_> {
     /// The positions, with the attitudes of the same message.
     fn stream(&self, file: &DataflashFile<'_>, notes: &mut Vec<Note>) -> Result<Stream, String> {
         let name = self.message.name.clone();
-        let time = time_reader(self.message)?;
-        let fix = self.message.column(&["Status"]).filter(|_| name.starts_with("GPS"));
-        let records = of_instance(self.message, self.instance);
-        if records.is_empty() {
-            return Err(format!("flight.topic: `{name}` has no instance {}", self.instance));
-        }
-        let origin = match self.place {
-            PlaceColumns::Local(_) => Some(origin(file).ok_or_else(|| {
+        let records = instances::select(file, &self.parts, self.instance, notes)?;
+        let origin = match place(self.message) {
+            Some(PlaceColumns::Local(_)) => Some(origin(file).ok_or_else(|| {
                 format!(
                     "`{name}` counts metres from an origin that the log does not have (ORGN): choose another \
                     by flight.topic"
                 )
             })?),
-            PlaceColumns::Geodetic(_) => None,
+            _ => None,
         };
+        let mut readers = Vec::new();
+        for Part { message, .. } in &self.parts {
+            let place = place(message).ok_or_else(|| format!("`{}` has no positions", message.name))?;
+            readers.push((time_reader(message)?, place, attitude_columns(message)));
+        }
         let (mut rows, mut without_fix) = (Vec::with_capacity(records.len()), 0);
-        for (number, record) in records {
-            if fix.is_some_and(|fix| fix.read(record) < 3.0) {
+        for instances::Selected { number, record, part, .. } in records {
+            let (time, place, attitude) = &readers[part];
+            if !instances::has_fix(&self.parts[part], record) {
                 without_fix += 1;
                 continue;
             }
             let mut row = streams::empty_row(number, time(record));
-            row.position = match (self.place, origin) {
+            row.position = match (*place, origin) {
                 (PlaceColumns::Local(columns), Some(origin)) => {
                     geodetic_from_local(columns.map(|column| column.read(record)), origin)
                 }
@@ -194,7 +186,7 @@ impl Chosen<'_, '_> {
                     columns.map(|column| column.read(record))
                 }
             };
-            if let Some([roll, pitch, yaw]) = self.attitude {
+            if let Some([roll, pitch, yaw]) = attitude {
                 row.attitude = [roll.read(record), pitch.read(record), yaw.read(record), f64::NAN];
             }
             rows.push(row);
@@ -221,10 +213,11 @@ fn geodetic_from_local([north, east, down]: [f64; 3], [lat, lon, height]: [f64; 
 fn attitude_stream(
     file: &DataflashFile<'_>,
     name: Option<&str>,
+    notes: &mut Vec<Note>,
 ) -> Result<(Option<Stream>, AttitudeKind), String> {
     let (stem, instance) = streams::split_instance(name.unwrap_or("ATT"));
     let quaternion = |message: &Message<'_>| message.columns(["Q1", "Q2", "Q3", "Q4"]);
-    let euler = |message: &Message<'_>| message.columns(["Roll", "Pitch", "Yaw"]);
+    let euler = |message: &Message<'_>| attitude_columns(message);
     let Some(message) =
         file.find(stem).filter(|&message| euler(message).is_some() || quaternion(message).is_some())
     else {
@@ -240,30 +233,29 @@ fn attitude_stream(
             if all.is_empty() { "none".to_owned() } else { all.join(", ") }
         ));
     };
-    let time = time_reader(message)?;
-    let records = of_instance(message, instance.unwrap_or_else(|| first_instance(message)));
-    let row = |number: usize, record: &[u8], attitude: [f64; 4]| ParsedRow {
-        attitude,
-        ..streams::empty_row(number, time(record))
-    };
-    let (rows, kind) = match (euler(message), quaternion(message)) {
-        (Some(angles), _) => {
-            let read = |record: &[u8]| {
+    let parts = instances::parts(file, message);
+    let mut readers = Vec::new();
+    for Part { message, .. } in &parts {
+        readers.push((time_reader(message)?, attitude_columns(message), quaternion(message)));
+    }
+    let mut rows = Vec::new();
+    for instances::Selected { number, record, part, .. } in instances::select(file, &parts, instance, notes)?
+    {
+        let (time, angles, q) = &readers[part];
+        let attitude = match (angles, q) {
+            (Some(angles), _) => {
                 let [roll, pitch, yaw] = angles.map(|column| column.read(record));
                 [roll, pitch, yaw, f64::NAN]
-            };
-            let rows = records.into_iter().map(|(number, record)| row(number, record, read(record)));
-            (rows.collect(), AttitudeKind::Euler)
-        }
-        (None, Some(q)) => {
-            let read = |record: &[u8]| {
+            }
+            (None, Some(q)) => {
                 let [w, x, y, z] = q.map(|column| column.read(record));
                 [x, y, z, w]
-            };
-            let rows = records.into_iter().map(|(number, record)| row(number, record, read(record)));
-            (rows.collect(), AttitudeKind::Quaternion)
-        }
-        (None, None) => (Vec::new(), AttitudeKind::None),
-    };
+            }
+            (None, None) => [f64::NAN; 4],
+        };
+        rows.push(ParsedRow { attitude, ..streams::empty_row(number, time(record)) });
+    }
+    let kind =
+        if attitude_columns(message).is_some() { AttitudeKind::Euler } else { AttitudeKind::Quaternion };
     Ok((Some(Stream { name: message.name.clone(), rows }), kind))
 }

@@ -4,6 +4,8 @@
 //! |---|---|
 //! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks are one log |
 //! | `trkpt` without `time`, or without `ele` where others have one | left out, counted |
+//! | `fix` | points of `none`, and of `2d` where others have three dimensions, are left out with a warning |
+//! | `unit` of an `ele` | applied |
 //! | `wpt`, `rte`, `extensions` and other tags of a point | not used, named in a note |
 
 use std::{collections::BTreeSet, path::Path};
@@ -19,7 +21,9 @@ use super::{
     FlightLogError, RawLog,
     columns::format_name,
     foreign_formats, kml, time_fields,
+    units::{self, Dimension, Qualifier},
     unused_keys::{unused_height_note, unused_topic_note},
+    xml_prose,
 };
 
 /// Reads the track points of a GPX file.
@@ -61,8 +65,40 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         }
     }
     let line = |point: &Node<'_, '_>| document.text_pos_at(point.range().start).row as usize;
-    let rows = points.iter().map(|point| raw_row(path, point, line(point))).collect::<Result<_, _>>()?;
-    Ok(RawLog { rows, notes: notes(&document, &points, spec) })
+    let mut notes = notes(&document, &points, spec);
+    notes.extend(xml_prose::notes(&document));
+    let flown = with_fix(&points, &mut notes);
+    if flown.is_empty() {
+        return Err(problem("no track point has a fix (`fix` is none): the receiver had none".to_owned()));
+    }
+    let rows = flown.iter().map(|point| raw_row(path, point, line(point))).collect::<Result<_, _>>()?;
+    Ok(RawLog { rows, notes })
+}
+
+/// The points with a fix, of three dimensions where any has one.
+fn with_fix<'a, 'b>(points: &[Node<'a, 'b>], notes: &mut Vec<Note>) -> Vec<Node<'a, 'b>> {
+    let dimensions = |point: &Node<'_, '_>| match child(point, "fix").as_deref().map(str::to_ascii_lowercase)
+    {
+        Some(fix) if fix == "none" => 0,
+        Some(fix) if fix == "2d" => 2,
+        _ => 3,
+    };
+    let least = if points.iter().any(|point| dimensions(point) == 3) { 3 } else { 2 };
+    let flown: Vec<Node<'a, 'b>> =
+        points.iter().filter(|point| dimensions(point) >= least).copied().collect();
+    let mut warn = |text: String| notes.push(Note { is_warning: true, text });
+    if flown.len() < points.len() {
+        warn(format!(
+            "{} of {} track points have no {}fix (`fix`), and are left out",
+            points.len() - flown.len(),
+            points.len(),
+            if least == 3 { "3D " } else { "" }
+        ));
+    }
+    if least == 2 && !flown.is_empty() {
+        warn("all fixes are 2d: receivers guess the heights then, check them".to_owned());
+    }
+    flown
 }
 
 /// Text of the child element `name` of a track point.
@@ -88,7 +124,12 @@ fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, Fli
     if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
         return Err(problem(format!("line {line}: latitude {latitude}, longitude {longitude} is no place")));
     }
-    let height_m = number("ele", child(point, "ele").as_deref())?;
+    let height_m = number("ele", child(point, "ele").as_deref())?
+        * metres(point).map_err(|text| {
+            problem(format!(
+                "line {line}: {text}: GPX has metres; write the unit as m or ft, or convert the heights"
+            ))
+        })?;
     let t_ns = match child(point, "time") {
         None => None,
         Some(text) => Some(time_fields::date_time_ns(&text).ok_or_else(|| {
@@ -101,6 +142,21 @@ fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, Fli
         position: RawPosition::Geodetic(Geodetic::from_deg(latitude, longitude, height_m)),
         attitude: RawAttitude::None,
     })
+}
+
+/// Metres in the unit that the height of a point names, which the standard does not know.
+///
+/// # Errors
+/// The unit is none of length.
+fn metres(point: &Node<'_, '_>) -> Result<f64, String> {
+    let element = point.children().find(|node| node.has_local_name("ele"));
+    let unit =
+        element.and_then(|element| ["unit", "units", "uom"].iter().find_map(|name| element.attribute(*name)));
+    let Some(unit) = unit else { return Ok(1.0) };
+    match units::parse_qualifier(unit) {
+        Some(Qualifier::Unit(unit)) if unit.dimension == Dimension::Length => Ok(unit.factor),
+        _ => Err(format!("`{unit}` of ele is no unit of length")),
+    }
 }
 
 /// Notes on keys and tags that are not used.
@@ -118,7 +174,7 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
             text: "flight.time_unit is not used: the times of GPX are dates".to_owned(),
         });
     }
-    let used = ["ele", "time", "trkpt", "trk", "trkseg", "gpx"];
+    let used = ["ele", "time", "fix", "trkpt", "trk", "trkseg", "gpx"];
     let in_points = points.iter().flat_map(|point| point.descendants());
     let waypoints = document
         .root_element()

@@ -3,9 +3,8 @@
 //! | record | applied |
 //! |---|---|
 //! | `B` | time of day, latitude, longitude, and the height that `flight.height_from` says |
-//! | `HFDTE` | the date; without it times count from midnight. Midnight goes on |
+//! | `H` | date, datum, what heights are above (`header`); without a date times count from midnight. Midnight goes on |
 //! | `I` | `LAD`, `LOD` (more decimals of minutes) and `TDS` (decimals of seconds) in `B` |
-//! | `HFALG` | what satellite heights are above: the ellipsoid (`ELL`), or the geoid (`GEO`) |
 //!
 //! Heights of satellite navigation are above the ellipsoid unless the record says otherwise; those by air
 //! pressure are of the standard atmosphere, not above any datum. A fix without height (`V`) is left out where
@@ -22,9 +21,12 @@ use super::{
     FlightLogError, RawLog,
     columns::{AttitudeKind, Frame},
     streams::{self, Stream, Streams},
-    time_fields,
     unused_keys::unused_topic_note,
 };
+
+mod header;
+
+use header::{GnssHeight, Header};
 
 const SECOND_NS: i128 = 1_000_000_000;
 const DAY_NS: i128 = 86_400 * SECOND_NS;
@@ -35,7 +37,10 @@ const FIX_CHARACTERS: usize = 35;
 #[derive(Clone, Copy, Debug)]
 struct Fix {
     line: usize,
+    /// Time of day, later with the date.
     time_ns: i128,
+    /// The date that the header states before the fix.
+    day_ns: i128,
     plane: [f64; 2],
     /// Whether the fix has three dimensions.
     is_3d: bool,
@@ -63,7 +68,7 @@ pub(super) fn is_igc(bytes: &[u8]) -> bool {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut lines = bytes.split(|&byte| byte == b'\n').take(500);
     match bytes.first() {
-        Some(b'A') => lines.any(|line| is_fix(line) || line.starts_with(b"HFDTE")),
+        Some(b'A') => lines.any(|line| is_fix(line) || line.get(2..5) == Some(b"DTE")),
         Some(b'H' | b'B' | b'I') => lines.any(is_fix),
         _ => false,
     }
@@ -79,31 +84,37 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     let bad_line =
         |line: usize, problem: String| FlightLogError::Header { path: path.to_owned(), line, problem };
     let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().collect();
-    let (mut fixes, mut extensions, mut day_ns, mut is_msl) =
-        (Vec::<Fix>::new(), Extensions::default(), 0, false);
+    let (mut fixes, mut extensions, mut header) =
+        (Vec::<Fix>::new(), Extensions::default(), Header::default());
     for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line_number = index + 1;
         let line = line.trim();
         if line.starts_with('I') {
             extensions = Extensions::parse(line);
-        } else if line.starts_with("HFDTE") {
-            day_ns = date_ns(line)
-                .ok_or_else(|| bad_line(line_number, format!("`{line}` is no date such as HFDTE010523")))?;
-        } else if line.starts_with("HFALG") {
-            is_msl = line.contains("GEO");
         } else if line.starts_with('B') {
             let fix =
                 Fix::parse(line, line_number, &extensions).map_err(|text| bad_line(line_number, text))?;
-            fixes.push(fix);
+            fixes.push(Fix { day_ns: header.day_ns.unwrap_or(0), ..fix });
+        } else {
+            header.read(line, line_number).map_err(|text| bad_line(line_number, text))?;
         }
     }
     if fixes.is_empty() {
         return Err(problem("the IGC file has no fixes (B records): it is no record of a flight".to_owned()));
     }
-    unroll_midnight(&mut fixes, day_ns, &mut notes);
+    notes.append(&mut header.notes);
+    unroll_midnight(&mut fixes, &mut notes);
     let uses_gnss = chooses_gnss(&fixes, spec, &mut notes).map_err(problem)?;
-    if uses_gnss {
+    if uses_gnss && header.gnss_height != GnssHeight::Unknown {
+        let is_msl = header.gnss_height == GnssHeight::MeanSeaLevel;
         notes.extend(streams::height_note("GNSS heights of the IGC file", is_msl, spec));
+    }
+    if let Some((number, text)) = header.pressure.filter(|_| !uses_gnss) {
+        let text = format!(
+            "line {number}: `{text}` sets the pressure heights otherwise than the standard atmosphere: they are \
+                taken as they stand"
+        );
+        notes.push(Note { is_warning: true, text });
     }
     let count = fixes.len();
     if uses_gnss && fixes.iter().any(|fix| fix.is_3d) {
@@ -152,16 +163,22 @@ fn chooses_gnss(fixes: &[Fix], spec: &FlightSpec, notes: &mut Vec<Note>) -> Resu
     }
 }
 
-/// Adds the date, and a day wherever the clock falls by more than half of one.
-fn unroll_midnight(fixes: &mut [Fix], day_ns: i128, notes: &mut Vec<Note>) {
-    let (mut offset_ns, mut before_ns) = (day_ns, None);
+/// Adds the dates, and a day wherever the clock falls by more than half of one without a new date.
+fn unroll_midnight(fixes: &mut [Fix], notes: &mut Vec<Note>) {
+    let mut offset_ns = fixes.first().map_or(0, |fix| fix.day_ns);
+    let mut before: Option<(i128, i128)> = None;
     for fix in fixes {
-        if before_ns.is_some_and(|before_ns: i128| before_ns - fix.time_ns > DAY_NS / 2) {
-            offset_ns += DAY_NS;
-            let text = format!("the clock passes midnight at line {}: the times go on from there", fix.line);
-            notes.push(Note { is_warning: false, text });
+        match before {
+            Some((day_ns, _)) if day_ns != fix.day_ns => offset_ns = fix.day_ns,
+            Some((_, time_ns)) if time_ns - fix.time_ns > DAY_NS / 2 => {
+                offset_ns += DAY_NS;
+                let text =
+                    format!("the clock passes midnight at line {}: the times go on from there", fix.line);
+                notes.push(Note { is_warning: false, text });
+            }
+            _ => {}
         }
-        before_ns = Some(fix.time_ns);
+        before = Some((fix.day_ns, fix.time_ns));
         fix.time_ns += offset_ns;
     }
 }
@@ -209,6 +226,7 @@ impl Fix {
         Ok(Self {
             line: number,
             time_ns,
+            day_ns: 0,
             plane: [if south { -latitude } else { latitude }, if west { -longitude } else { longitude }],
             is_3d: &line[24..25] == "A",
             pressure_m: height(25)?,
@@ -246,13 +264,4 @@ fn decimals(line: &str, place: Option<(usize, usize)>) -> f64 {
         .filter(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()))
         .and_then(|digits| format!("0.{digits}").parse().ok())
         .unwrap_or(0.0)
-}
-
-/// Nanoseconds since 1970 of `HFDTE010523` or `HFDTEDATE:010523,01`: day, month, year.
-fn date_ns(line: &str) -> Option<i128> {
-    let digits: String =
-        line.chars().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
-    let [day, month, year] = [digits.get(0..2)?, digits.get(2..4)?, digits.get(4..6)?];
-    let century = if year < "80" { "20" } else { "19" };
-    time_fields::date_ns(&format!("{century}{year}-{month}-{day}"))
 }

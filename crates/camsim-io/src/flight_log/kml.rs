@@ -4,11 +4,11 @@
 //! |---|---|
 //! | `gx:Track` with `when` and `gx:coord` | time, longitude, latitude, height |
 //! | its `gx:angles` | heading, tilt (nose up), roll (right wing down), degrees |
-//! | `Placemark` with `TimeStamp` and `Point` | the same of one row, where the file has no `gx:Track` |
+//! | `Placemark` with `TimeStamp`, or `TimeSpan`, and `Point` | the same of one row, where the file has no `gx:Track`; of a span its beginning |
 //! | `LineString` | refused: it has no times |
 //!
-//! Heights are above mean sea level (`altitudeMode` `absolute`). Heights above ground, or clamped to it, are
-//! refused.
+//! Heights are above mean sea level (`altitudeMode` `absolute`, of the geometry or of the nearest element
+//! around it that states one, as `gx:MultiTrack`). Heights above ground, or clamped to it, are refused.
 
 use std::path::Path;
 
@@ -25,6 +25,7 @@ use super::{
     streams::{self, Stream, Streams},
     time_fields,
     unused_keys::{unused_height_note, unused_topic_note},
+    xml_prose,
 };
 
 /// Reads the tracks of a parsed KML file.
@@ -44,6 +45,8 @@ pub(super) fn read(
         if tracks.is_empty() { reader.placemarks() } else { reader.tracks(&tracks) }.map_err(problem)?;
     let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().chain(unused_height_note(spec)).collect();
     notes.extend(streams::height_note("heights of KML", true, spec));
+    notes.extend(offset_note(document));
+    notes.extend(xml_prose::notes(document));
     let has_angles = rows.iter().any(ParsedRow::has_attitude);
     if has_angles {
         let text = "gx:angles are taken as heading, tilt with the nose up, roll with the right wing down";
@@ -141,13 +144,12 @@ impl KmlReader<'_, '_> {
     fn placemarks(&self) -> Result<Vec<ParsedRow>, String> {
         let mut rows = Vec::new();
         for placemark in elements(self.document.root_element(), "Placemark") {
-            let (Some(point), Some(stamp)) =
-                (elements(placemark, "Point").next(), elements(placemark, "TimeStamp").next())
-            else {
-                continue;
-            };
-            let (Some(when), Some(text)) = (elements(stamp, "when").next(), text_of(point, "coordinates"))
-            else {
+            let Some(point) = elements(placemark, "Point").next() else { continue };
+            let stamp =
+                elements(placemark, "TimeStamp").next().and_then(|stamp| elements(stamp, "when").next());
+            let span =
+                || elements(placemark, "TimeSpan").next().and_then(|span| elements(span, "begin").next());
+            let (Some(when), Some(text)) = (stamp.or_else(span), text_of(point, "coordinates")) else {
                 continue;
             };
             let line = self.line(point);
@@ -179,16 +181,45 @@ impl KmlReader<'_, '_> {
     }
 }
 
-/// Refuses heights that are above no datum.
+/// Refuses heights that are above no datum, by the mode of a geometry or of the nearest element around it.
 fn check_altitude_mode(node: Node<'_, '_>, line: usize) -> Result<(), String> {
-    let mode = text_of(node, "altitudeMode").unwrap_or("clampToGround");
-    if mode == "absolute" {
-        return Ok(());
-    }
-    Err(format!(
-        "line {line}: the altitudeMode is {mode}: the heights are above ground or none; export the flight with \
-            altitudes above mean sea level (`absolute`)"
-    ))
+    let of_element = |node: Node<'_, '_>| {
+        let mode =
+            node.children().find(|child| child.is_element() && child.tag_name().name() == "altitudeMode")?;
+        mode.text().map(|text| text.trim().to_owned())
+    };
+    let stated = node.ancestors().find_map(of_element);
+    let to_absolute = "write <altitudeMode>absolute</altitudeMode> into it";
+    let problem = match stated.as_deref() {
+        Some(mode) if mode.eq_ignore_ascii_case("absolute") => return Ok(()),
+        None => format!(
+            "there is no altitudeMode, which in KML means that heights are not used (clampToGround): if they are \
+                above mean sea level, {to_absolute}"
+        ),
+        Some(mode) if mode.to_ascii_lowercase().starts_with("clamp") => format!(
+            "the altitudeMode is {mode}, so the heights are not used: if they are above mean sea level, \
+                {to_absolute}"
+        ),
+        Some(mode) => format!(
+            "the altitudeMode is {mode}, so the heights are above ground: export the flight with altitudes above \
+                mean sea level (absolute)"
+        ),
+    };
+    Err(format!("line {line}: {problem}"))
+}
+
+/// A warning that heights are shown with an offset, which is not applied.
+fn offset_note(document: &Document<'_>) -> Option<Note> {
+    let offset = elements(document.root_element(), "altitudeOffset")
+        .find(|element| element.text().and_then(|text| text.trim().parse::<f64>().ok()) != Some(0.0))?;
+    let line = document.text_pos_at(offset.range().start).row;
+    Some(Note {
+        is_warning: true,
+        text: format!(
+            "line {line}: gx:altitudeOffset {} is not applied: the heights are those of the coordinates",
+            offset.text().unwrap_or("").trim()
+        ),
+    })
 }
 
 /// Latitude, longitude and height of a text of longitude, latitude and height; NaN where the text is empty, as

@@ -8,9 +8,11 @@
 //! | `sensor_msgs/NavSatFix` | latitude, longitude, height above the ellipsoid; rows without a fix are left out |
 //! | `sensor_msgs/Imu` | the orientation, beside a `NavSatFix` |
 //!
-//! Axes are those of ROS (REP 103): worlds have x east, y north, z up, bodies x forward, y left, z up. A topic
-//! of positions is chosen by `flight.topic`, unless only one fits. Times are the stamps of the headers, or the
-//! recorder's where those are 0. CDR and ROS 1 messages are read, whole or in chunks (zstd, lz4).
+//! Axes are those of ROS (REP 103): worlds have x east, y north, z up, bodies x forward, y left, z up, unless
+//! the names of their frames say otherwise (`frames`). Transforms are composed to the root of their tree
+//! (`tree`). A topic of positions is chosen by `flight.topic`, unless only one fits. Times are the stamps of the
+//! headers, or the recorder's where those are 0. CDR and ROS 1 messages are read, whole or in chunks (zstd,
+//! lz4).
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -18,22 +20,23 @@ use camsim_core::{
     flight_log::Note,
     scenario::{AttitudeSource, FlightSpec, LogFormat},
 };
-use glam::DQuat;
 
 use super::{
-    FLU_FROM_FRD, FlightLogError, RawLog,
+    FlightLogError, RawLog,
     columns::{AttitudeKind, Frame},
-    ned_from_enu,
     streams::{self, Stream, Streams},
     unused_keys::unused_height_note,
 };
 
 mod cdr;
+mod frames;
 mod messages;
 mod records;
+mod tree;
 
 use messages::{RosKind, Sample};
 use records::{TopicKey, Topics};
+use tree::Tree;
 
 /// Reads the poses of an MCAP file.
 ///
@@ -48,7 +51,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
         .map_err(|text| problem([&[text][..], &topics.damage].concat().join("; ")))?;
     let mut notes: Vec<Note> = topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
     notes.extend(unused_height_note(spec));
-    let samples = topics.samples.remove(&key).unwrap_or_default();
+    let samples = turned(&topics, &key, kind, &mut notes).map_err(problem)?;
     let is_geodetic = kind == RosKind::NavSatFix;
     let imu = if !is_geodetic && attitude_name.is_none() || spec.attitude == AttitudeSource::Track {
         None
@@ -58,15 +61,46 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     if is_geodetic {
         notes.extend(streams::height_note("heights of NavSatFix", false, spec));
     }
-    let position = stream(&key, &samples, imu.is_none(), is_geodetic, &mut notes);
-    let attitude = imu.map(|key| {
-        let samples = topics.samples.remove(&key).unwrap_or_default();
-        stream(&key, &samples, true, is_geodetic, &mut notes)
-    });
+    let position = stream(&key, &samples, imu.is_none(), &mut notes);
+    let attitude = match imu {
+        None => None,
+        // One topic may be named for both.
+        Some(other) if other == key => Some(stream(&key, &samples, true, &mut notes)),
+        Some(other) => {
+            let kind = topics.kinds.get(&other).copied().unwrap_or(RosKind::Imu);
+            let samples = turned(&topics, &other, kind, &mut notes).map_err(problem)?;
+            Some(stream(&other, &samples, true, &mut notes))
+        }
+    };
     let has_attitude = attitude.is_some() || position.rows.iter().any(|row| row.has_attitude());
     let kind = if has_attitude { AttitudeKind::Quaternion } else { AttitudeKind::None };
-    let frame = if is_geodetic { Frame::Geodetic } else { Frame::EastNorthUp };
+    let frame = if is_geodetic { Frame::Geodetic } else { Frame::NorthEastDown };
     Streams { frame, kind, position, attitude, notes }.into_log(path, spec)
+}
+
+/// The samples of a topic, in the root of their transforms and in camsim's axes.
+fn turned(
+    topics: &Topics,
+    key: &TopicKey,
+    kind: RosKind,
+    notes: &mut Vec<Note>,
+) -> Result<Vec<Sample>, String> {
+    let name = key.to_string();
+    let mut samples = topics.samples.get(key).cloned().unwrap_or_default();
+    let tree = Tree::new(topics, &key.topic);
+    let Some(first) = samples.first() else { return Ok(samples) };
+    let (frame, child) = (first.frame.clone(), first.child.clone());
+    match kind {
+        RosKind::Transforms => tree.compose(&name, &mut samples, notes)?,
+        // Their headers name the sensor.
+        RosKind::NavSatFix | RosKind::Imu => notes.extend(tree.mount_note(&name, &frame)),
+        _ => {
+            notes.extend(tree.unused_parent_note(&name, &frame, topics));
+            notes.extend(child.and_then(|child| tree.mount_note(&name, &child)));
+        }
+    }
+    frames::turn(&name, kind, &mut samples, notes)?;
+    Ok(samples)
 }
 
 /// The topic of a name that fits, or the only one that does.
@@ -142,14 +176,8 @@ fn choose_imu(topics: &Topics, name: Option<&str>) -> Result<Option<TopicKey>, S
     }
 }
 
-/// The samples as rows; of a geodetic log, attitudes are turned to north-east-down here.
-fn stream(
-    key: &TopicKey,
-    samples: &[Sample],
-    with_attitude: bool,
-    is_geodetic: bool,
-    notes: &mut Vec<Note>,
-) -> Stream {
+/// The samples as rows.
+fn stream(key: &TopicKey, samples: &[Sample], with_attitude: bool, notes: &mut Vec<Note>) -> Stream {
     let name = key.to_string();
     let (mut rows, mut without_fix, mut without_stamp) = (Vec::with_capacity(samples.len()), 0, 0);
     for sample in samples {
@@ -158,13 +186,10 @@ fn stream(
             continue;
         }
         without_stamp += usize::from(sample.stamp_ns == 0);
-        let time_ns = if sample.stamp_ns == 0 { sample.recorded_ns } else { sample.stamp_ns };
-        let mut row = streams::empty_row(sample.number, Some(time_ns));
+        let mut row = streams::empty_row(sample.number, Some(sample.time_ns()));
         row.position = sample.position.unwrap_or([f64::NAN; 3]);
         if let Some(rotation) = sample.rotation.filter(|_| with_attitude) {
-            let rotation = DQuat::from_array(rotation);
-            let ned = if is_geodetic { ned_from_enu() * rotation * FLU_FROM_FRD } else { rotation };
-            row.attitude = ned.to_array();
+            row.attitude = rotation;
         }
         rows.push(row);
     }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{
     column_names::{KNOWN_NAMES, PREFIXES},
-    foreign_formats::{FOREIGN_FORMATS, OTHER_XML, SUBTITLES},
+    foreign_formats::{FOREIGN_FORMATS, OTHER_BINARY, OTHER_XML, SUBTITLES},
     units::{Dimension, UNITS},
 };
 
@@ -23,29 +23,32 @@ const FORMATS: &[(&str, &str, &str)] = &[
     (
         "kml",
         "`gx:Track` with `when`, `gx:coord`, `gx:angles`; or placemarks with `TimeStamp` and `Point`",
-        "degrees, metres above mean sea level (altitudeMode absolute); angles are heading, tilt, roll",
+        "degrees, metres above mean sea level (altitudeMode absolute, of the track or of what is around it: \
+            gx:MultiTrack); angles are heading, tilt, roll",
     ),
     (
         "igc",
-        "`B` records, with `LAD`, `LOD`, `TDS`",
-        "heights by flight.height_from; no attitude: flight.attitude = \"track\"",
+        "`B` records, with `LAD`, `LOD`, `TDS`; of the header date, datum, `ALG`, `ALP`",
+        "WGS 84 (another datum in `HFDTM` gives a warning); heights by flight.height_from; no attitude: \
+            flight.attitude = \"track\"",
     ),
     (
         "ulog",
         "vehicle_global_position, vehicle_local_position (with its origin), vehicle_odometry, \
-            vehicle_gps_position, the same of estimator_*; vehicle_attitude",
+            estimator_global_position, estimator_local_position, vehicle_gps_position, sensor_gps; \
+            vehicle_attitude, estimator_attitude",
         "PX4's own; quaternions w, x, y, z of a forward-right-down body to north-east-down",
     ),
     (
         "dataflash",
-        "POS, AHR2, XKF1 or NKF1 (with ORGN), GPS, SIM; ATT, XKQ",
+        "POS, XKF1 or NKF1 (with ORGN), AHR2, GPS, SIM; ATT, XKQ",
         "ArduPilot's own, with the factors of its formats: degrees, metres above mean sea level",
     ),
     (
         "mcap",
         "PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry, TFMessage (`/tf#child_frame`), \
             NavSatFix with Imu; ROS 2 (cdr) or ROS 1",
-        "metres, x east, y north, z up; body forward-left-up (REP 103)",
+        "metres, x east, y north, z up; body forward-left-up (REP 103), unless the frames' names say otherwise",
     ),
 ];
 
@@ -146,6 +149,25 @@ const RULES: &[(&str, &str)] = &[
             that is \"msl\"; other tags are named",
     ),
     (
+        "Several instances (ulog, dataflash)",
+        "without `#1` in flight.topic that which the vehicle used at each time: the core of XKF4.PI or NKF4.PI, \
+            the receiver of GPS.U, the estimator of estimator_selector_status; a change gives a warning. Where the \
+            log does not say, the first is flown with a warning that lists them",
+    ),
+    (
+        "Frames (mcap)",
+        "three letters in the name of a frame are its axes: `odom_ned`, `local_origin_ned`, `map_nwu`, \
+            `base_link_frd`, `fcu_frd`; an `optical` child looks along z, and is turned to a body that does \
+            (camera.mount counts from there). Transforms (`/tf#base_link`) are composed to the root, between \
+            instants; the frame of another topic that has a pose in a parent gives a warning",
+    ),
+    (
+        "Fixes",
+        "rows without a 3D fix (fix_type, Status, NavSatFix.status, V, `fix` of GPX) or that the log marks as \
+            invalid are left out and counted",
+    ),
+    ("Equal times", "refused where all times are equal and the positions are not"),
+    (
         "Jumps",
         "a flight that goes on at more than 1000 m/s between two rows after all repairs gives a warning with \
             the place",
@@ -204,7 +226,7 @@ pub fn reference() -> String {
     }
     text += "\n## Refused with advice\n\n| file | what to do |\n|---|---|\n";
     let by_signature = FOREIGN_FORMATS.iter().map(|format| (format.name, format.advice));
-    for (name, advice) in by_signature.chain([SUBTITLES, OTHER_XML]) {
+    for (name, advice) in by_signature.chain(OTHER_BINARY).chain([SUBTITLES, OTHER_XML]) {
         let _ = writeln!(text, "| {name} | {advice} |");
     }
     text

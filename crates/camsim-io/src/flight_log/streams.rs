@@ -63,6 +63,7 @@ impl Streams {
         if !self.position.rows.iter().any(ParsedRow::has_position) {
             return Err(problem(format!("`{}` has no usable position", self.position.name)));
         }
+        self.position.check_clock().map_err(problem)?;
         let mut rows = match self.attitude.take() {
             Some(mut attitude) => {
                 attitude.sort(&mut self.notes);
@@ -80,6 +81,21 @@ impl Streams {
 }
 
 impl Stream {
+    /// Refuses positions that differ, all at one time; rows at the instants of another stream would hide that.
+    fn check_clock(&self) -> Result<(), String> {
+        let known: Vec<&ParsedRow> = self.rows.iter().filter(|row| row.has_position()).collect();
+        let [first, others @ ..] = &known[..] else { return Ok(()) };
+        let is_moving = others.iter().any(|row| row.position != first.position);
+        if !is_moving || others.iter().any(|row| row.time != first.time) {
+            return Ok(());
+        }
+        Err(format!(
+            "all times of `{}` are equal and its positions are not, so there is no flight: record it with the time \
+                of each position",
+            self.name
+        ))
+    }
+
     /// Sorts the samples by time, with a warning if they were not.
     fn sort(&mut self, notes: &mut Vec<Note>) {
         let late = |pair: &&[ParsedRow]| pair[1].time < pair[0].time && pair[1].time.is_some();

@@ -8,7 +8,8 @@
 //! | `vehicle_odometry`, `vehicle_visual_odometry` | `position` (m north, east, down) with `q` |
 //! | `vehicle_attitude`, `estimator_attitude` | `q`: w, x, y, z; takes forward-right-down to north-east-down |
 //!
-//! `flight.topic` names others, as `estimator_local_position#1` or `vehicle_gps_position, vehicle_attitude`.
+//! `flight.topic` names others, as `estimator_local_position#1` or `vehicle_gps_position, vehicle_attitude`. Of
+//! several instances that of the estimator which flew is taken (`instances`).
 //! Times are `timestamp_sample` where a topic has it, else `timestamp`, in microseconds since the start.
 
 use std::path::Path;
@@ -27,16 +28,20 @@ use super::{
 };
 
 mod file;
+mod instances;
 mod positions;
 
 use file::{Topic, UlogFile};
+use instances::Candidate;
 use positions::{Place, PositionReader, full_name, time_field, time_ns, xyzw};
 
 /// Topics with positions, the best first.
-const POSITIONS: [&str; 5] = [
+const POSITIONS: [&str; 7] = [
     "vehicle_global_position",
     "vehicle_local_position",
     "vehicle_odometry",
+    "estimator_global_position",
+    "estimator_local_position",
     "vehicle_gps_position",
     "sensor_gps",
 ];
@@ -57,7 +62,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     let attitude = if spec.attitude == AttitudeSource::Track || reader.quaternion.is_some() {
         None
     } else {
-        attitude_stream(&file, topic, attitude_name).map_err(problem)?
+        attitude_stream(&file, &topic, attitude_name, &mut notes).map_err(problem)?
     };
     let kind = match (&attitude, reader.quaternion) {
         (None, None) => AttitudeKind::None,
@@ -67,36 +72,27 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
     Streams { frame, kind, position, attitude, notes }.into_log(path, spec)
 }
 
-/// The topic of a name with messages; several subscriptions of one topic are one here: the longest counts.
-fn find<'a, 'b>(file: &'b UlogFile<'a>, name: &str) -> Option<&'b Topic<'a>> {
-    let (stem, instance) = streams::split_instance(name);
-    file.topics
-        .iter()
-        .filter(|topic| topic.name == stem && u32::from(topic.instance) == instance.unwrap_or(0))
-        .max_by_key(|topic| topic.messages.len())
-        .filter(|topic| !topic.messages.is_empty())
-}
-
 /// The positions to fly: of the topic that `flight.topic` names, else of the first with valid ones.
-fn positions<'a, 'b>(
-    file: &'b UlogFile<'a>,
+fn positions<'a>(
+    file: &UlogFile<'a>,
     name: Option<&str>,
     spec: &FlightSpec,
     notes: &mut Vec<Note>,
-) -> Result<(&'b Topic<'a>, PositionReader, Stream), String> {
+) -> Result<(Topic<'a>, PositionReader, Stream), String> {
     let usable = |topic: &&Topic<'_>| !topic.messages.is_empty() && Place::of(topic).is_some();
     let all: Vec<String> = file.topics.iter().filter(usable).map(full_name).collect();
-    let candidates: Vec<&Topic<'_>> = match name {
-        Some(name) => find(file, name).filter(usable).into_iter().collect(),
-        None => POSITIONS.iter().filter_map(|name| find(file, name).filter(usable)).collect(),
+    let mut candidates: Vec<Candidate<'a>> = match name {
+        Some(name) => instances::candidates(file, name),
+        None => POSITIONS.iter().flat_map(|name| instances::candidates(file, name)).collect(),
     };
-    for topic in &candidates {
-        let mut its_notes = Vec::new();
+    candidates.retain(|candidate| usable(&&candidate.topic));
+    for Candidate { topic, note } in &candidates {
+        let mut its_notes: Vec<Note> = note.clone().into_iter().collect();
         let reader = PositionReader::new(topic, spec, &mut its_notes)?;
         let stream = reader.stream(topic, &mut its_notes);
         if stream.rows.iter().any(ParsedRow::has_position) {
             notes.extend(its_notes);
-            return Ok((topic, reader, stream));
+            return Ok((topic.clone(), reader, stream));
         }
         notes.push(Note { is_warning: true, text: format!("`{}` has no valid position", full_name(topic)) });
     }
@@ -105,7 +101,7 @@ fn positions<'a, 'b>(
             format!("flight.topic: `{name}` is no topic with positions; there are: {}", listed(&all))
         }
         (_, false, _) => {
-            let tried: Vec<String> = candidates.into_iter().map(full_name).collect();
+            let tried: Vec<String> = candidates.iter().map(|one| full_name(&one.topic)).collect();
             let others: Vec<String> = all.into_iter().filter(|name| !tried.contains(name)).collect();
             format!(
                 "no position is valid in {}: the estimator had none, fly with GNSS or motion capture{}",
@@ -135,10 +131,13 @@ fn attitude_stream(
     file: &UlogFile<'_>,
     position: &Topic<'_>,
     name: Option<&str>,
+    notes: &mut Vec<Note>,
 ) -> Result<Option<Stream>, String> {
     let has_attitude = |topic: &&Topic<'_>| topic.array_field::<4>("q").is_some();
-    let topic = match name {
-        Some(name) => Some(find(file, name).filter(has_attitude).ok_or_else(|| {
+    let find =
+        |name: &str| instances::candidates(file, name).into_iter().find(|one| has_attitude(&&one.topic));
+    let candidate = match name {
+        Some(name) => Some(find(name).ok_or_else(|| {
             let all: Vec<String> = file
                 .topics
                 .iter()
@@ -151,12 +150,16 @@ fn attitude_stream(
             // The attitude of the same estimator, else the vehicle's own.
             let (estimator, _) = position.name.split_once('_').unwrap_or(("", ""));
             let suffix = if position.name.ends_with("_groundtruth") { "_groundtruth" } else { "" };
-            let own = format!("{estimator}_attitude{suffix}#{}", position.instance);
-            find(file, &own).or_else(|| find(file, "vehicle_attitude")).filter(has_attitude)
+            let mut own = format!("{estimator}_attitude{suffix}");
+            if !position.is_merged {
+                own += &format!("#{}", position.instance);
+            }
+            find(&own).or_else(|| find("vehicle_attitude"))
         }
     };
-    let Some(topic) = topic else { return Ok(None) };
-    let time = time_field(topic)?;
+    let Some(Candidate { topic, note }) = candidate else { return Ok(None) };
+    notes.extend(note);
+    let time = time_field(&topic)?;
     let q = topic.array_field::<4>("q").ok_or_else(|| format!("`{}` has no q", topic.name))?;
     let rows: Vec<ParsedRow> = topic
         .messages
@@ -166,5 +169,5 @@ fn attitude_stream(
             ..streams::empty_row(number, time_ns(time.read(message)))
         })
         .collect();
-    Ok(Some(Stream { name: full_name(topic), rows }))
+    Ok(Some(Stream { name: full_name(&topic), rows }))
 }

@@ -18,6 +18,8 @@ pub(super) struct Message<'a> {
     /// Number in the file (from 1) and bytes behind the head.
     pub(super) records: Vec<(usize, &'a [u8])>,
     columns: HashMap<String, Column>,
+    /// Places and lengths of columns of text.
+    texts: HashMap<String, (usize, usize)>,
     length: usize,
 }
 
@@ -133,22 +135,35 @@ impl<'a> DataflashFile<'a> {
         if usize::from(length) < HEAD_BYTES {
             return;
         }
-        let (mut columns, mut offset) = (HashMap::new(), 0);
+        let (mut columns, mut texts, mut offset) = (HashMap::new(), HashMap::new(), 0);
         for (format, name) in formats.bytes().zip(names.split(',')) {
             let Some((scalar, factor, size)) = column_type(format) else { break };
-            if let Some(scalar) = scalar {
-                columns.insert(name.trim().to_owned(), Column { offset, scalar, factor });
+            let name = name.trim().to_owned();
+            match scalar {
+                Some(scalar) => drop(columns.insert(name, Column { offset, scalar, factor })),
+                None => drop(texts.insert(name, (offset, size))),
             }
             offset += size;
         }
         if let Entry::Vacant(entry) = self.messages.entry(id) {
-            entry.insert(Message { name, records: Vec::new(), columns, length: length.into() });
+            entry.insert(Message { name, records: Vec::new(), columns, texts, length: length.into() });
         }
     }
 
     /// The messages of a name, if there are any.
     pub(super) fn find(&self, name: &str) -> Option<&Message<'a>> {
         self.messages.values().find(|message| message.name == name && !message.records.is_empty())
+    }
+
+    /// The last value of a parameter of the vehicle.
+    pub(super) fn parameter(&self, name: &str) -> Option<f64> {
+        let message = self.find("PARM")?;
+        let (value, &(at, size)) = (message.column(&["Value"])?, message.texts.get("Name")?);
+        let is_wanted = |record: &&(usize, &[u8])| {
+            let text = record.1.get(at..at + size).unwrap_or_default();
+            text.split(|&byte| byte == 0).next() == Some(name.as_bytes())
+        };
+        message.records.iter().rev().find(is_wanted).map(|(_, record)| value.read(record))
     }
 
     /// All messages with records, by name.

@@ -1,5 +1,7 @@
 //! The ROS messages that hold a pose, or a part of one.
 
+use std::{collections::HashSet, sync::Arc};
+
 use super::cdr::Decoder;
 
 /// RosKind of a message.
@@ -65,23 +67,52 @@ pub(super) struct Sample {
     pub(super) rotation: Option<[f64; 4]>,
     /// Whether a receiver had a fix; true of other messages.
     pub(super) is_valid: bool,
+    /// Frame of the header, without the slash that ROS 1 had before it.
+    pub(super) frame: Arc<str>,
+    /// Frame whose pose it is, where the message names it.
+    pub(super) child: Option<Arc<str>>,
 }
 
-/// The samples of a message, each with its child frame if it is one of several transforms; `None` if the
-/// message is too short.
+impl Sample {
+    /// The stamp, or the time of the recording where it is 0.
+    pub(super) fn time_ns(&self) -> i128 {
+        if self.stamp_ns == 0 { self.recorded_ns } else { self.stamp_ns }
+    }
+}
+
+/// Names of frames, each once.
+#[derive(Debug, Default)]
+pub(super) struct Names(HashSet<Arc<str>>);
+
+impl Names {
+    fn intern(&mut self, name: &str) -> Arc<str> {
+        let name = name.trim_start_matches('/');
+        if let Some(known) = self.0.get(name) {
+            return known.clone();
+        }
+        let new = Arc::<str>::from(name);
+        self.0.insert(new.clone());
+        new
+    }
+}
+
+/// The samples of a message; `None` if the message is too short.
 pub(super) fn decode(
     kind: RosKind,
     mut decoder: Decoder<'_>,
     number: usize,
     recorded_ns: i128,
-) -> Option<Vec<(Option<String>, Sample)>> {
-    let sample = |stamp_ns, position, rotation, is_valid| Sample {
+    names: &mut Names,
+) -> Option<Vec<Sample>> {
+    let sample = |(stamp_ns, frame), child, position, rotation, is_valid| Sample {
         number,
         stamp_ns,
         recorded_ns,
         position,
         rotation,
         is_valid,
+        frame,
+        child,
     };
     let d = &mut decoder;
     match kind {
@@ -89,45 +120,47 @@ pub(super) fn decode(
             let count = d.u32()?;
             let mut samples = Vec::new();
             for _ in 0..count {
-                let stamp = header_ns(d)?;
-                let child = d.text()?;
+                let header = header(d, names)?;
+                let child = names.intern(&d.text()?);
                 let (position, rotation) = (d.f64s()?, d.f64s()?);
-                samples.push((Some(child), sample(stamp, Some(position), Some(rotation), true)));
+                samples.push(sample(header, Some(child), Some(position), Some(rotation), true));
             }
             Some(samples)
         }
         RosKind::Pose | RosKind::PoseWithCovariance | RosKind::Odometry | RosKind::Transform => {
-            let stamp = header_ns(d)?;
-            if matches!(kind, RosKind::Odometry | RosKind::Transform) {
-                d.text()?;
-            }
+            let header = header(d, names)?;
+            let child = if matches!(kind, RosKind::Odometry | RosKind::Transform) {
+                Some(names.intern(&d.text()?)).filter(|name| !name.is_empty())
+            } else {
+                None
+            };
             let (position, rotation) = (d.f64s()?, d.f64s()?);
-            Some(vec![(None, sample(stamp, Some(position), Some(rotation), true))])
+            Some(vec![sample(header, child, Some(position), Some(rotation), true)])
         }
         RosKind::NavSatFix => {
-            let stamp = header_ns(d)?;
+            let header = header(d, names)?;
             let status = d.u8()?.cast_signed();
             d.u16()?;
             let position = d.f64s()?;
-            Some(vec![(None, sample(stamp, Some(position), None, status >= 0))])
+            Some(vec![sample(header, None, Some(position), None, status >= 0)])
         }
         RosKind::Imu => {
-            let stamp = header_ns(d)?;
+            let header = header(d, names)?;
             let rotation = d.f64s()?;
             let covariance: [f64; 9] = d.f64s()?;
             // A first element of -1 says that there is no orientation.
             let has_rotation = covariance[0] != -1.0 && rotation != [0.0; 4];
-            Some(vec![(None, sample(stamp, None, has_rotation.then_some(rotation), true))])
+            Some(vec![sample(header, None, None, has_rotation.then_some(rotation), true)])
         }
     }
 }
 
-/// Stamp of a header, whose frame is passed over.
-fn header_ns(decoder: &mut Decoder<'_>) -> Option<i128> {
+/// Stamp and frame of a header.
+fn header(decoder: &mut Decoder<'_>, names: &mut Names) -> Option<(i128, Arc<str>)> {
     if decoder.is_ros1 {
         decoder.u32()?;
     }
     let (seconds, nanoseconds) = (decoder.u32()?, decoder.u32()?);
-    decoder.text()?;
-    Some(i128::from(seconds.cast_signed()) * 1_000_000_000 + i128::from(nanoseconds))
+    let frame = names.intern(&decoder.text()?);
+    Some((i128::from(seconds.cast_signed()) * 1_000_000_000 + i128::from(nanoseconds), frame))
 }

@@ -5,6 +5,7 @@ use std::{
     collections::{BTreeMap, HashMap},
     fmt,
     io::Read,
+    sync::Arc,
 };
 
 use mcap::{
@@ -16,17 +17,17 @@ use mcap::{
 use super::{
     super::scalars::array,
     cdr::Decoder,
-    messages::{self, RosKind, Sample},
+    messages::{self, Names, RosKind, Sample},
 };
 
 /// Larger chunks are damage.
 const MAX_CHUNK_BYTES: u64 = 1 << 32;
 
-/// A topic, and the child frame where it holds several transforms.
+/// A topic, and the child frame where it holds the poses of several.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct TopicKey {
     pub(super) topic: String,
-    pub(super) child: Option<String>,
+    pub(super) child: Option<Arc<str>>,
 }
 
 impl fmt::Display for TopicKey {
@@ -63,6 +64,7 @@ struct RecordReader {
     schemas: HashMap<u16, String>,
     channels: HashMap<u16, PoseChannel>,
     topics: Topics,
+    names: Names,
     messages: usize,
     undecoded: usize,
 }
@@ -102,7 +104,36 @@ pub(super) fn read(bytes: &[u8]) -> Result<Topics, String> {
         );
         reader.topics.damage.push(text);
     }
+    reader.topics.split_children();
     Ok(reader.topics)
+}
+
+impl Topics {
+    /// Splits topics that hold the poses of several bodies.
+    fn split_children(&mut self) {
+        let has_several = |samples: &[Sample]| {
+            let mut children = samples.iter().map(|sample| &sample.child);
+            let first = children.next();
+            children.any(|child| Some(child) != first)
+        };
+        let mixed: Vec<TopicKey> = self
+            .samples
+            .iter()
+            .filter(|(key, samples)| key.child.is_none() && has_several(samples))
+            .map(|(key, _)| key.clone())
+            .collect();
+        for key in mixed {
+            let (Some(samples), Some(kind)) = (self.samples.remove(&key), self.kinds.remove(&key)) else {
+                continue;
+            };
+            for sample in samples {
+                let child = Some(sample.child.clone().unwrap_or_default());
+                let key = TopicKey { topic: key.topic.clone(), child };
+                self.kinds.insert(key.clone(), kind);
+                self.samples.entry(key).or_default().push(sample);
+            }
+        }
+    }
 }
 
 /// Takes the next record off the bytes; `None` at their end.
@@ -149,13 +180,15 @@ impl RecordReader {
                 self.messages += 1;
                 let Some(channel) = self.channels.get(&header.channel_id) else { return Ok(()) };
                 let decoded = Decoder::new(&channel.encoding, &data).and_then(|decoder| {
-                    messages::decode(channel.kind, decoder, self.messages, i128::from(header.log_time))
+                    let recorded_ns = i128::from(header.log_time);
+                    messages::decode(channel.kind, decoder, self.messages, recorded_ns, &mut self.names)
                 });
                 let Some(samples) = decoded else {
                     self.undecoded += 1;
                     return Ok(());
                 };
-                for (child, sample) in samples {
+                for sample in samples {
+                    let child = sample.child.clone().filter(|_| channel.kind == RosKind::Transforms);
                     let key = TopicKey { topic: channel.topic.clone(), child };
                     self.topics.kinds.insert(key.clone(), channel.kind);
                     self.topics.samples.entry(key).or_default().push(sample);

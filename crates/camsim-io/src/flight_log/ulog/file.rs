@@ -17,7 +17,7 @@ const APPENDED: u8 = 1;
 const MAX_DEPTH: usize = 8;
 
 /// A topic with its messages.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Topic<'a> {
     /// Name, as `vehicle_attitude`.
     pub(super) name: String,
@@ -25,6 +25,8 @@ pub(super) struct Topic<'a> {
     pub(super) instance: u8,
     /// Number in the file (from 1) and bytes of each message.
     pub(super) messages: Vec<(usize, &'a [u8])>,
+    /// Whether the messages are of several instances, one after the other.
+    pub(super) is_merged: bool,
     fields: HashMap<String, (usize, Scalar)>,
 }
 
@@ -155,7 +157,7 @@ impl<'a> UlogFile<'a> {
                 let mut fields = HashMap::new();
                 self.lay_out(&name, "", &mut 0, &mut fields, 0);
                 self.by_id.insert(u16::from_le_bytes([low, high]), self.topics.len());
-                self.topics.push(Topic { name, instance, messages: Vec::new(), fields });
+                self.topics.push(Topic { name, instance, messages: Vec::new(), is_merged: false, fields });
             }
             b'R' => {
                 if let Some(id) = array(body, 0) {

@@ -58,6 +58,8 @@ pub(super) struct PositionReader {
     fix: Option<UlogField>,
     /// Whether a position is valid.
     valid: Vec<UlogField>,
+    /// Whether the estimate goes on without any measurement of the position.
+    dead_reckoning: Option<UlogField>,
     /// Counters of jumps of the estimate.
     resets: Vec<UlogField>,
     /// Latitude, longitude (deg) and height of the origin of local positions.
@@ -107,6 +109,7 @@ impl PositionReader {
             place,
             fix: topic.field("fix_type"),
             valid,
+            dead_reckoning: topic.field("dead_reckoning"),
             resets: all(&[
                 "xy_reset_counter",
                 "z_reset_counter",
@@ -127,7 +130,7 @@ impl PositionReader {
     /// The positions; those that the log itself calls invalid are left out, with a note.
     pub(super) fn stream(&self, topic: &Topic<'_>, notes: &mut Vec<Note>) -> Stream {
         let mut rows = Vec::with_capacity(topic.messages.len());
-        let mut left_out = 0;
+        let (mut left_out, mut reckoned) = (0, 0);
         let mut resets: Vec<usize> = Vec::new();
         let mut counters: Option<Vec<f64>> = None;
         for &(number, message) in &topic.messages {
@@ -137,6 +140,7 @@ impl PositionReader {
                 left_out += 1;
                 continue;
             }
+            reckoned += usize::from(self.dead_reckoning.is_some_and(|field| field.read(message) == 1.0));
             let now: Vec<f64> = self.resets.iter().map(|field| field.read(message)).collect();
             if counters.as_ref().is_some_and(|before| *before != now) {
                 resets.push(number);
@@ -156,6 +160,16 @@ impl PositionReader {
                 text: format!(
                     "{left_out} of {} positions of `{name}` are marked as invalid or without a 3D fix, and \
                         are left out",
+                    topic.messages.len()
+                ),
+            });
+        }
+        if reckoned > 0 {
+            notes.push(Note {
+                is_warning: true,
+                text: format!(
+                    "{reckoned} of {} positions of `{name}` are dead reckoning (without GNSS or another \
+                        position), and drift",
                     topic.messages.len()
                 ),
             });
@@ -254,7 +268,11 @@ pub(super) fn time_ns(microseconds: f64) -> Option<i128> {
 
 /// Name of a topic with its instance.
 pub(super) fn full_name(topic: &Topic<'_>) -> String {
-    if topic.instance == 0 { topic.name.clone() } else { format!("{}#{}", topic.name, topic.instance) }
+    if topic.is_merged || topic.instance == 0 {
+        topic.name.clone()
+    } else {
+        format!("{}#{}", topic.name, topic.instance)
+    }
 }
 
 /// The order of camsim's quaternions.
