@@ -162,7 +162,7 @@ impl<'a> Console<'a> {
         if self.quiet {
             return;
         }
-        let text = text.to_string();
+        let text = visible(&text.to_string());
         match (&mut self.said, self.variation) {
             (Some(said), Some(index)) => {
                 let is_new = said.insert(text.clone());
@@ -177,7 +177,7 @@ impl<'a> Console<'a> {
     /// Prints a note to standard error with `-v` only.
     pub fn detail(&mut self, text: impl fmt::Display) {
         if self.verbose {
-            self.complain(&format!("{text}\n"));
+            self.complain(&format!("{}\n", visible(&text.to_string())));
         }
     }
 
@@ -198,9 +198,16 @@ impl<'a> Console<'a> {
         if failure.is_broken_pipe() {
             return DONE;
         }
-        self.complain(&format!("{}\n", self.whole(&failure.to_string())));
+        self.complain(&format!("{}\n", self.whole(&visible(&failure.to_string()))));
         failure.code()
     }
+}
+
+/// A text with its control characters as escapes: they may be those of a file's name.
+fn visible(text: &str) -> String {
+    let shown =
+        |c: char| if c.is_control() && c != '\n' { c.escape_default().collect() } else { c.to_string() };
+    text.chars().map(shown).collect()
 }
 
 /// A word quoted for a shell.

@@ -22,6 +22,7 @@ mod accessor;
 mod asset;
 mod bake;
 mod emissive;
+mod foreign;
 mod material;
 mod moving;
 mod normals;
@@ -180,6 +181,23 @@ impl Model {
         })
     }
 
+    /// Spacing of the 32-bit numbers that hold the largest coordinate of a vertex, metres of the model.
+    #[must_use]
+    pub fn spacing_m(&self) -> f64 {
+        let spacing = |part: &Part| {
+            let bounds = part.shape.bounds();
+            let largest = bounds.min.abs().max(bounds.max.abs()).max_element() as f32;
+            let next = f32::from_bits(largest.to_bits().saturating_add(1));
+            let is_finite = largest.is_finite() && next.is_finite();
+            if is_finite {
+                f64::from(next - largest) * part.model_from_shape.matrix3.x_axis.length()
+            } else {
+                0.0
+            }
+        };
+        self.parts.iter().map(spacing).fold(0.0, f64::max)
+    }
+
     /// Number of triangles.
     #[must_use]
     pub fn triangles(&self) -> usize {
@@ -273,7 +291,9 @@ fn read(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model
     if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
         notes.push("has animations, but time_s is not set: its nodes keep their static transforms".into());
     }
-    notes.extend(asset.notes.iter().cloned());
+    // Without light, metal looks as it is painted: leaving it out changes nothing.
+    let is_of_metal = |note: &String| !options.normals && *note == treatments::METAL_ALONE;
+    notes.extend(asset.notes.iter().filter(|note| !is_of_metal(note)).cloned());
     notes.extend(pose_notes);
     notes.extend(moving.notes);
     notes.extend(materials.notes);

@@ -28,6 +28,7 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod far_models;
 mod motion;
 mod objects;
 mod optics;
@@ -36,6 +37,7 @@ mod placements;
 mod pose_table;
 mod scene;
 mod sensors;
+mod sky_share;
 mod track_points;
 mod unlikely;
 
@@ -560,6 +562,7 @@ fn warnings(
     }
     warnings.extend(terrain.and_then(|summary| ortho_coverage::ortho_coverage_warning(sequence, summary)));
     warnings.extend(terrain.and_then(|summary| flight_over_terrain_warning(sequence, summary)));
+    warnings.extend(sky_share::sky_warning(sequence));
     warnings
 }
 

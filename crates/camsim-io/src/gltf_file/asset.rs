@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde_json::Value;
 
-use super::{GltfError, accessor, preprocess::preprocess, treatments, validation};
+use super::{GltfError, accessor, foreign, preprocess::preprocess, treatments, validation};
 use crate::similar_file::suggestion;
 
 /// A parsed file with its buffers.
@@ -25,6 +25,9 @@ impl Asset {
         let broken = |message: String| GltfError::Broken { path: path.into(), message };
         if bytes.is_empty() {
             return Err(broken("is empty".into()));
+        }
+        if let Some(message) = foreign::message(path, &bytes) {
+            return Err(broken(message));
         }
         let is_glb = bytes.starts_with(b"glTF");
         let (text, binary_chunk) =

@@ -190,6 +190,9 @@ pub(super) fn notes(json: &Value) -> Vec<String> {
     notes
 }
 
+/// The note of a file whose only shading property is how much of a metal its materials are.
+pub(super) const METAL_ALONE: &str = "colour is albedo alone: metallicFactor is ignored";
+
 /// Shading properties of the materials that are not unlit; they are ignored.
 fn shading_properties(json: &Value) -> BTreeSet<&str> {
     let mut names = BTreeSet::new();

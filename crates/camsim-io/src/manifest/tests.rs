@@ -142,7 +142,7 @@ fn manifests_are_scenarios_that_repeat_the_run() {
     // A key that is set beside a path does not move the path.
     let sets = [("scene.terrain.ortho_white".to_owned(), "2047".to_owned())];
     let terrain = read_scenario(&run, &sets, None).unwrap().scene.terrain.unwrap();
-    assert_eq!(terrain.ortho, Some(dir.path().join("out/../there/ortho.tif")));
+    assert_eq!(terrain.ortho, Some(dir.path().join("out/../there/ortho.tif").into()));
     for (text, wanted) in [
         ("{ \"apply\": {} }", "run.json: JSON without `scenario`"),
         ("{ \"scenario\": ", "run.json: neither TOML nor JSON"),

@@ -39,7 +39,7 @@ fn ned_frame(origin_deg: [f64; 2], height_m: f64) -> impl Fn(f64, f64, f64) -> D
 }
 
 fn spec(dem: &Path, ortho: Option<&Path>) -> TerrainSpec {
-    TerrainSpec { dem: dem.into(), ortho: ortho.map(Into::into), ..TerrainSpec::default() }
+    TerrainSpec { dem: dem.into(), ortho: ortho.map(|path| path.into()), ..TerrainSpec::default() }
 }
 
 /// Tags of a small GeoTIFF.

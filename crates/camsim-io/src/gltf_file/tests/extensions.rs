@@ -74,9 +74,15 @@ fn ignored_extensions_are_noted_once_where_they_occur() {
     // Application-specific data are not part of the model.
     assert!(notes(&[("/nodes/0/extras", json!({ "extensions": { "ACME_glow": {} } }))]).is_empty());
     let metal = json!({ "metallicFactor": 0.5, "baseColorTexture": { "index": 0 } });
+    // Without light, a metal looks as it is painted.
+    assert!(notes(&[("/materials/0/pbrMetallicRoughness", metal.clone())]).is_empty());
+    let with_normals = [
+        ("/materials/0/pbrMetallicRoughness", metal.clone()),
+        ("/materials/0/normalTexture", json!({ "index": 0 })),
+    ];
     assert_eq!(
-        notes(&[("/materials/0/pbrMetallicRoughness", metal.clone())]),
-        ["colour is albedo alone: metallicFactor is ignored"]
+        notes(&with_normals),
+        ["colour is albedo alone: metallicFactor and normalTexture are ignored"]
     );
     let unlit = json!([{ "pbrMetallicRoughness": metal, "normalTexture": { "index": 0 },
         "extensions": { "KHR_materials_unlit": {} } }]);
