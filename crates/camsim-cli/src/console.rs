@@ -26,8 +26,10 @@ pub struct Console<'a> {
     camera: Option<String>,
     /// The variation of a random scenario that messages are about.
     variation: Option<u64>,
-    /// Of a series of variations: what has been said, and is not said again.
-    said: Option<HashSet<String>>,
+    /// Whether variations follow each other.
+    is_series: bool,
+    /// Warnings, and all notes of a series of variations, that have been printed and are not printed again.
+    said: HashSet<String>,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -51,7 +53,8 @@ impl<'a> Console<'a> {
             scenario: None,
             camera: None,
             variation: None,
-            said: None,
+            is_series: false,
+            said: HashSet::new(),
         }
     }
 
@@ -77,7 +80,7 @@ impl<'a> Console<'a> {
 
     /// From now on a note that several variations have is printed once, with the number of the first.
     pub fn begin_series(&mut self) {
-        self.said = Some(HashSet::new());
+        self.is_series = true;
     }
 
     /// The command line as typed.
@@ -163,14 +166,13 @@ impl<'a> Console<'a> {
             return;
         }
         let text = visible(&text.to_string());
-        match (&mut self.said, self.variation) {
-            (Some(said), Some(index)) => {
-                let is_new = said.insert(text.clone());
-                if is_new {
+        match self.variation.filter(|_| self.is_series) {
+            None => self.complain(&format!("{text}\n")),
+            Some(index) => {
+                if self.said.insert(text.clone()) {
                     self.complain(&format!("variation {index}: {text}\n"));
                 }
             }
-            _ => self.complain(&format!("{text}\n")),
         }
     }
 
@@ -181,9 +183,12 @@ impl<'a> Console<'a> {
         }
     }
 
-    /// Prints a warning to standard error, unless `-q`.
+    /// Prints a warning to standard error, unless `-q`, once.
     pub fn warn(&mut self, text: impl fmt::Display) {
-        self.note(format_args!("warning: {text}"));
+        let text = format!("warning: {text}");
+        if self.is_series || self.said.insert(text.clone()) {
+            self.note(text);
+        }
     }
 
     /// Prints a text to standard error, even with `-q`. Errors of that stream are ignored.

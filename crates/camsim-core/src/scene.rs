@@ -26,7 +26,7 @@ pub use batches::{Batch, PlacedShape, SceneBatches};
 pub use blend_split::{BlendSplit, split_intersecting_blended};
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use light::{Light, transformed_normal};
-pub use mesh::{Material, Mesh, MeshVertex, REPEATED_REACH_M, Shape};
+pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use mesh_lod::{LodTolerance, ModelLod, SceneLods, ShapeLod, ShapeLods};
 pub use motion::{RigidMotion, RigidState};
 pub use prefilter::{Prefilter, PrefilterTaps};

@@ -225,7 +225,7 @@ pub fn read_moving_gltf(path: &Path, options: GltfOptions, motion: &ModelMotion)
 
 // Long because it is the list of what a file consists of and of what is said about it.
 fn read(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model, GltfError> {
-    let asset = Asset::read(path)?;
+    let asset = Asset::read(path, options.normals)?;
     let periods_s = if motion.animate { moving::periods_s(&asset)? } else { Vec::new() };
     let options = GltfOptions { time_s: options.time_s.or(motion.animate.then_some(0.0)), ..options };
     let broken = |message: String| GltfError::Broken { path: path.into(), message };
@@ -291,9 +291,7 @@ fn read(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model
     if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
         notes.push("has animations, but time_s is not set: its nodes keep their static transforms".into());
     }
-    // Without light, metal looks as it is painted: leaving it out changes nothing.
-    let is_of_metal = |note: &String| !options.normals && *note == treatments::METAL_ALONE;
-    notes.extend(asset.notes.iter().filter(|note| !is_of_metal(note)).cloned());
+    notes.extend(asset.notes.iter().cloned());
     notes.extend(pose_notes);
     notes.extend(moving.notes);
     notes.extend(materials.notes);

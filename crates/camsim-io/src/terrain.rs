@@ -39,13 +39,13 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use crate::pictures::PictureError;
+use crate::{pictures::PictureError, wording::range};
 pub use documentation::documentation;
 pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
 pub(crate) use tiff_file::quoted;
 pub(crate) use units::metres_per_unit_name;
 
-use dem::{Dem, EMPTY_RANGE, HeightStatistics, USUAL_HEIGHTS_M, widened};
+use dem::{Dem, EMPTY_RANGE, HeightStatistics, USUAL_HEIGHTS_M, union, widened};
 use ortho::Ortho;
 
 /// NED position (metres) of latitude, longitude (radians) and ellipsoidal height (metres).
@@ -371,14 +371,11 @@ fn missing(heights: &HeightStatistics) -> u64 {
 /// What implausible values are, and the units that would make heights of all values.
 fn implausible_values(dem: &Dem, heights: &HeightStatistics) -> String {
     let in_file = |range_m: [f64; 2]| range_m.map(|metres| metres / dem.unit_m());
-    let all = in_file(widened(
-        widened(heights.range_m, heights.implausible_range_m[0]),
-        heights.implausible_range_m[1],
-    ));
+    let all = in_file(union(heights.range_m, heights.implausible_range_m));
     let unit = if dem.unit_m() == 1.0 { "metres".to_owned() } else { format!("units of {} m", dem.unit_m()) };
     format!(
         "values of {} are no plausible heights in {unit} (-11 500 to 9500 m): if they have another unit, {}",
-        files::range_text(in_file(heights.implausible_range_m)),
+        range(in_file(heights.implausible_range_m)),
         height_unit::other_units(all, USUAL_HEIGHTS_M)
     )
 }

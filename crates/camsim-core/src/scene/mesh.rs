@@ -143,7 +143,7 @@ impl Material {
 
 /// How far a repeated image reaches from its centre, metres: from a height of 1 km to a third of a degree below the
 /// horizon.
-pub const REPEATED_REACH_M: f64 = 2e5;
+const REPEATED_REACH_M: f64 = 2e5;
 
 /// Growth of the cells of a repeated image: each is this share of its distance from the centre.
 const REPEATED_GROWTH: f64 = 0.5;
@@ -253,7 +253,7 @@ impl Mesh {
         Self::new(vertices, vec![0, 3, 1, 0, 2, 3], texture, centre_ned_m, Wrap::Clamp)
     }
 
-    /// As [`Mesh::level_picture`], but the image repeats in both directions, [`REPEATED_REACH_M`] far. Its cells
+    /// As [`Mesh::level_picture`], but the image repeats in both directions, 200 km far. Its cells
     /// grow with their distance from the centre; each has texture coordinates of its own near 0, so that 32-bit
     /// numbers place the image as well in the distance as nearby.
     pub fn repeated_picture(texture: Arc<Texture>, centre_ned_m: DVec3, width_m: f64) -> Self {
@@ -410,6 +410,29 @@ mod tests {
             })
             .sum();
         assert!((area.abs() - 800.0).abs() < 1e-9, "{area}");
+    }
+
+    #[test]
+    fn repeated_picture_has_the_same_image_everywhere() {
+        let texture = Arc::new(Texture { size_px: [4, 2], rgba8: vec![255; 32], encoding: Encoding::Srgb });
+        let centre = DVec3::new(100.0, -50.0, 3.0);
+        let one = Mesh::level_picture(texture.clone(), centre, 40.0);
+        let many = Mesh::repeated_picture(texture, centre, 40.0);
+        let uv = |mesh: &Mesh, north: f64, east: f64| {
+            let from = centre + DVec3::new(north, east, -10.0);
+            mesh.intersect(from, DVec3::Z, 20.0).expect("hit").1
+        };
+        // Copies are 20 m high and 40 m wide; 32-bit numbers hold 200 km to 8 mm.
+        for [rows, columns] in [[0.0, 0.0], [1.0, -1.0], [-7.0, 3.0], [1000.0, -77.0], [9999.0, 4999.0]] {
+            for [north, east] in [[3.0, -11.0], [-9.0, 19.0]] {
+                let [u, v] = uv(&one, north, east);
+                let [far_u, far_v] = uv(&many, north + 20.0 * rows, east + 40.0 * columns);
+                let off = [far_u - u, far_v - v].map(|by| (by - by.round()).abs());
+                assert!(off.iter().all(|by| *by < 1e-3), "{rows} {columns}: {off:?}");
+            }
+        }
+        let reach = many.bounds().max - centre;
+        assert!(reach.x >= REPEATED_REACH_M && reach.y >= REPEATED_REACH_M, "{reach}");
     }
 
     #[test]

@@ -7,6 +7,8 @@ use camsim_core::{
 };
 use glam::DVec3;
 
+use crate::wording::rounded;
+
 /// Distance from the flight that is never far, metres.
 const NEAR_M: f64 = 1000.0;
 /// Sizes of a model from which it is far.
@@ -22,17 +24,8 @@ pub(super) struct Copy {
 
 impl Copy {
     pub fn new(origin_ned_m: DVec3, meshes: &[Mesh]) -> Self {
-        let mut bounds = Aabb::EMPTY;
-        for mesh in meshes {
-            let own = mesh.bounds();
-            bounds.include(own.min);
-            bounds.include(own.max);
-        }
+        let bounds = meshes.iter().fold(Aabb::EMPTY, |all, mesh| all.union(&mesh.bounds()));
         Self { origin_ned_m, bounds }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.bounds.min.x > self.bounds.max.x
     }
 
     fn size_m(&self) -> f64 {
@@ -59,7 +52,7 @@ pub(super) fn notes(
     log.rows.iter().for_each(|row| flight.include(row.position_ned_m));
     let nearest = copies
         .iter()
-        .filter(|copy| !copy.is_empty())
+        .filter(|copy| !copy.bounds.is_empty())
         .min_by(|a, b| a.distance_m(&flight).total_cmp(&b.distance_m(&flight)));
     let far = nearest.and_then(|copy| far_note(scenario, spec, copy, copy.distance_m(&flight)));
     let spacing_m = spacing_m * spec.scale;
@@ -67,16 +60,16 @@ pub(super) fn notes(
         format!(
             "its vertices have coordinates so large that 32-bit floats hold them only to {} m: subtract the coordinates \
              of a place nearby in the program that made the model, and give that place as at",
-            shown(spacing_m)
+            rounded(spacing_m)
         )
     });
     far.into_iter().chain(coarse).collect()
 }
 
 fn far_note(scenario: &Scenario, spec: &GltfSpec, copy: &Copy, distance_m: f64) -> Option<String> {
-    let centre = 0.5 * (copy.bounds.min + copy.bounds.max);
+    let centre = copy.bounds.centre();
     let from_origin = centre - copy.origin_ned_m;
-    let km = shown(distance_m / 1e3);
+    let km = rounded(distance_m / 1e3);
     if distance_m > NEAR_M.max(FAR_SIZES * copy.size_m())
         && from_origin.truncate().length() > 0.5 * distance_m
     {
@@ -84,10 +77,9 @@ fn far_note(scenario: &Scenario, spec: &GltfSpec, copy: &Copy, distance_m: f64) 
         let at = copy.origin_ned_m - DVec3::new(centre.x, centre.y, copy.bounds.max.z);
         return Some(format!(
             "the model is {km} km from the flight: its vertices lie {} m north and {} m east of its own origin and look \
-             like coordinates of a map grid; place it with at = [{:.1}, {:.1}, {:.1}], which brings its foot to the local \
-             origin (geodetic = [latitude, longitude, height] is the place of its own origin)",
-            whole(from_origin.x),
-            whole(from_origin.y),
+             like coordinates of a map grid; at = [{:.1}, {:.1}, {:.1}] puts its foot at the local origin",
+            rounded(from_origin.x),
+            rounded(from_origin.y),
             at.x,
             at.y,
             at.z
@@ -105,16 +97,7 @@ fn far_note(scenario: &Scenario, spec: &GltfSpec, copy: &Copy, distance_m: f64) 
         format!(
             "the model is {km} km from the flight and looks smaller than a pixel from there ({} m in size): check \
              scene.gltf.{key} and scale",
-            shown(copy.size_m())
+            rounded(copy.size_m())
         )
     })
-}
-
-/// A number with three digits.
-fn shown(value: f64) -> String {
-    if value >= 100.0 { format!("{value:.0}") } else { format!("{}", (value * 100.0).round() / 100.0) }
-}
-
-fn whole(value: f64) -> String {
-    format!("{:.0}", value + 0.0)
 }

@@ -25,7 +25,8 @@ use crate::{
     board_file::read_board,
     gltf_file::{GltfOptions, MAX_RADIUS_M, read_moving_gltf},
     pictures::read_texture,
-    terrain::{HeightShift, TerrainSummary, files::joined_notes, read_terrain_in_light},
+    terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
+    wording::joined_notes,
 };
 
 /// Reads all files that `[scene]` names. Returns the scene, the summary of the terrain, and notes.

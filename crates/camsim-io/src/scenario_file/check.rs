@@ -99,6 +99,9 @@ fn check_table(
 
 /// Resolves a path. Returns what is wrong with it.
 fn resolve(tree: &Tree, indexed_key: &str, path: &mut String) -> Option<String> {
+    if path.is_empty() {
+        return Some("the path is empty; name a file, or remove the key".into());
+    }
     let resolved = tree.resolve(indexed_key, path);
     let problem = escapes::path_problem(path, &resolved);
     *path = resolved.to_string_lossy().into_owned();

@@ -8,36 +8,19 @@ use super::{
     wkt,
 };
 
-/// Words that only the name of a vertical system has.
-const VERTICAL_WORDS: [&str; 28] = [
+/// Words that only the name of a vertical system has, besides those of systems above the sea.
+const VERTICAL_WORDS: [&str; 11] = [
     "height",
     "heights",
     "hgt",
     "elevation",
     "elevations",
     "elev",
+    "ellipsoidal",
     "vertical",
     "vcs",
     "depth",
     "depths",
-    "msl",
-    "navd88",
-    "navd",
-    "ngvd29",
-    "ngvd",
-    "cgvd2013",
-    "cgvd28",
-    "egm96",
-    "egm2008",
-    "egm08",
-    "egm84",
-    "evrf2000",
-    "evrf2007",
-    "orthometric",
-    "geoid",
-    "dhhn2016",
-    "ahd",
-    "odn",
 ];
 
 /// Words of vertical systems above the sea.
@@ -98,7 +81,7 @@ fn parts(keys: &GeoKeys) -> impl Iterator<Item = Part<'_>> {
             let pieces = piece.split(" + ").enumerate();
             pieces.map(move |(index, text)| {
                 let is_vertical =
-                    index > 0 || words(text).iter().any(|word| VERTICAL_WORDS.contains(&&**word));
+                    index > 0 || has_word(text, &VERTICAL_WORDS) || has_word(text, &SEA_LEVEL_WORDS);
                 Part { key, text: text.trim(), is_vertical }
             })
         })
@@ -126,10 +109,9 @@ pub(super) fn height_unit(keys: &GeoKeys) -> Option<(String, f64)> {
 /// The vertical system that the citations name, if its datum is known.
 pub(super) fn vertical_system(keys: &GeoKeys) -> Option<StatedVerticalCrs> {
     vertical_parts(keys).find_map(|part| {
-        let words = words(part.text);
-        let datum = if words.iter().any(|word| word.starts_with("ellipsoid")) {
+        let datum = if words(part.text).iter().any(|word| word.starts_with("ellipsoid")) {
             VerticalDatum::Ellipsoid
-        } else if words.iter().any(|word| SEA_LEVEL_WORDS.contains(&&**word)) {
+        } else if has_word(part.text, &SEA_LEVEL_WORDS) {
             VerticalDatum::SeaLevel
         } else {
             return None;
@@ -173,15 +155,15 @@ fn unit_m(text: &str) -> Option<f64> {
     if let Some(unit) = in_brackets.filter_map(metres_per_unit_name).last() {
         return Some(unit);
     }
-    let words = words(text);
-    let has = |names: &[&str]| words.iter().any(|word| names.contains(&&**word));
-    let is_us = has(&["us", "survey", "usft", "ftus", "sft"]);
-    if has(&["feet", "foot", "ft", "usft", "ftus", "sft"]) {
+    if has_word(text, &["feet", "foot", "ft", "usft", "ftus", "sft"]) {
+        let is_us = has_word(text, &["us", "survey", "usft", "ftus", "sft"]);
         return metres_per_unit_name(if is_us { "us-ft" } else { "ft" });
     }
-    let long_names =
-        ["metre", "metres", "meter", "meters", "centimetre", "centimetres", "centimeter", "centimeters"];
-    words.iter().filter(|word| long_names.contains(&&***word)).find_map(|word| metres_per_unit_name(word))
+    words(text).iter().filter(|word| word.len() > 2).find_map(|word| metres_per_unit_name(word))
+}
+
+fn has_word(text: &str, of: &[&str]) -> bool {
+    words(text).iter().any(|word| of.contains(&&**word))
 }
 
 fn words(text: &str) -> Vec<String> {

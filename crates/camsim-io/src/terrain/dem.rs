@@ -14,6 +14,7 @@ use super::{
     grid_tiles::{self, TileIndex},
     tile::Tile,
 };
+use crate::wording::joined_notes;
 
 /// Range of plausible heights, metres: from below the deepest sea to above the highest mountain. Others are
 /// undeclared no-data values.
@@ -69,6 +70,11 @@ pub(super) fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
     [low.min(value), high.max(value)]
 }
 
+/// The range of two ranges, which may be empty.
+pub(super) fn union(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
 fn is_plausible(height_m: f64) -> bool {
     (PLAUSIBLE_HEIGHTS_M[0]..=PLAUSIBLE_HEIGHTS_M[1]).contains(&height_m)
 }
@@ -89,7 +95,7 @@ impl Dem {
         let path = files::label(&paths);
         let mut in_order: Vec<Option<Tile>> = tiles.into_iter().map(Some).collect();
         let tiles: Vec<Tile> = joined.order.iter().filter_map(|&at| in_order.get_mut(at)?.take()).collect();
-        let notes = files::joined_notes(tiles.iter().map(|tile| (tile.path.as_path(), &tile.notes[..])));
+        let notes = joined_notes(tiles.iter().map(|tile| (tile.path.as_path(), &tile.notes[..])));
         let crs = tiles.first().and_then(|tile| Crs::new(tile.crs.epsg));
         let crs = crs.ok_or_else(|| TerrainFileError::NoCrs { path: path.clone() })?;
         let mut dem = Self {
@@ -216,13 +222,10 @@ impl Dem {
             })
         });
         rows.reduce(none, |a, b| HeightStatistics {
-            range_m: widened(widened(a.range_m, b.range_m[0]), b.range_m[1]),
+            range_m: union(a.range_m, b.range_m),
             voids: a.voids + b.voids,
             implausible: a.implausible + b.implausible,
-            implausible_range_m: widened(
-                widened(a.implausible_range_m, b.implausible_range_m[0]),
-                b.implausible_range_m[1],
-            ),
+            implausible_range_m: union(a.implausible_range_m, b.implausible_range_m),
             unlikely: a.unlikely + b.unlikely,
         })
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::scenario::FileList;
 
-use super::{TerrainFileError, height_unit::rounded, tiff_file::quoted};
+use super::{TerrainFileError, tiff_file::quoted};
 
 /// Endings of files of heights, for folders and patterns.
 const DEM_ENDINGS: [&str; 4] = ["tif", "tiff", "hgt", "asc"];
@@ -14,8 +14,6 @@ const PICTURE_ENDINGS: [&str; 6] = ["tif", "tiff", "png", "jpg", "jpeg", "webp"]
 /// Largest number of tiles.
 const MAX_TILES: usize = 4096;
 
-/// Number of tiles that messages name.
-const NAMED: usize = 2;
 /// Number of tiles that a command names.
 const IN_COMMAND: usize = 8;
 
@@ -138,42 +136,11 @@ pub(super) fn label(paths: &[PathBuf]) -> PathBuf {
     }
 }
 
-/// Notes of several files, each once, with the names of those that it is about.
-pub(crate) fn joined_notes<'a>(files: impl Iterator<Item = (&'a Path, &'a [String])>) -> Vec<String> {
-    let mut notes: Vec<(&str, Vec<&Path>)> = Vec::new();
-    for (path, note) in files.flat_map(|(path, notes)| notes.iter().map(move |note| (path, note))) {
-        match notes.iter_mut().find(|(known, _)| known == note) {
-            Some((_, paths)) if !paths.contains(&path) => paths.push(path),
-            Some(_) => {}
-            None => notes.push((note, vec![path])),
-        }
-    }
-    let text = |(note, paths): &(&str, Vec<&Path>)| format!("{}: {note}", named(paths));
-    notes.iter().map(text).collect()
-}
-
-/// Paths in words: two of them, and how many more there are.
-fn named(paths: &[&Path]) -> String {
-    let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-    match &names[..] {
-        [first, second] => format!("{first} and {second}"),
-        names if names.len() > NAMED => {
-            format!("{} and {} more files", names[..NAMED].join(", "), names.len() - NAMED)
-        }
-        names => names.join(", "),
-    }
-}
-
 /// Paths as words of a command.
 pub(super) fn command_paths(paths: &[&Path]) -> String {
     let mut words: Vec<String> = paths.iter().take(IN_COMMAND).map(|path| quoted(path)).collect();
     words.extend((paths.len() > IN_COMMAND).then(|| "...".to_owned()));
     words.join(" ")
-}
-
-/// A range of heights for messages.
-pub(super) fn range_text([low, high]: [f64; 2]) -> String {
-    format!("{} to {}", rounded(low), rounded(high))
 }
 
 #[cfg(test)]
@@ -204,13 +171,5 @@ mod tests {
         assert_eq!(dem_files(&twice).unwrap().len(), 1);
         let error = dem_files(&path("a").into()).unwrap_err().to_string();
         assert!(error.contains("is a folder without .tif, .tiff, .hgt, .asc"), "{error}");
-    }
-
-    #[test]
-    fn equal_notes_of_several_files_are_one() {
-        let (same, own) = (vec!["same".to_owned()], vec!["same".to_owned(), "own".to_owned()]);
-        let files = [("a", &same), ("b", &own), ("c", &same), ("c", &same)];
-        let notes = joined_notes(files.iter().map(|(path, notes)| (Path::new(*path), &notes[..])));
-        assert_eq!(notes, ["a, b and 1 more files: same", "b: own"]);
     }
 }

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::{TerrainFileError, crs::Crs, files::command_paths, georeference::Affine, tile::Tile};
+use super::{
+    TerrainFileError, crs::Crs, files::command_paths, georeference::Affine, tile::Tile,
+    vertical_crs::VerticalDatum,
+};
 
 /// Largest distance of a tile's corners from the grid of the others, pixels.
 const MAX_OFFSET_PX: f64 = 0.02;
@@ -59,28 +62,22 @@ pub(super) fn check_alike(tiles: &[Tile]) -> Result<(), TerrainFileError> {
             ),
         ));
     }
-    match others.iter().find(|tile| tile.datum != first.datum) {
-        Some(tile) => Err(meaning(
-            &tile.path,
+    // A tile that states no datum may have that of the others.
+    let of_datum = |datum: VerticalDatum| tiles.iter().find(|tile| tile.datum == Some(datum));
+    if let (Some(ellipsoid), Some(sea)) =
+        (of_datum(VerticalDatum::Ellipsoid), of_datum(VerticalDatum::SeaLevel))
+    {
+        return Err(meaning(
+            &ellipsoid.path,
             format!(
-                "states heights {}, but {} states heights {}: tiles of one terrain need the same; convert one of them, \
-                 for example with `gdalwarp -s_srs EPSG:A+B -t_srs EPSG:A+C IN OUT`, or correct what it states",
-                datum_words(tile),
-                first.path.display(),
-                datum_words(first)
+                "states heights above the ellipsoid, but {} states heights above the sea: tiles of one terrain need the \
+                 same; convert one of them, for example with `gdalwarp -s_srs EPSG:A+B -t_srs EPSG:A+C IN OUT`, or \
+                 correct what it states",
+                sea.path.display()
             ),
-        )),
-        None => Ok(()),
+        ));
     }
-}
-
-fn datum_words(tile: &Tile) -> &'static str {
-    use super::vertical_crs::VerticalDatum::{Ellipsoid, SeaLevel};
-    match tile.datum {
-        Some(Ellipsoid) => "above the ellipsoid",
-        Some(SeaLevel) => "above the sea",
-        None => "without their origin",
-    }
+    Ok(())
 }
 
 fn meaning(path: &Path, problem: String) -> TerrainFileError {

@@ -12,6 +12,7 @@ use super::{
     units::{HEIGHT_UNITS, SAME_UNIT_M, metres_per_unit_code, metres_per_unit_name},
     vertical_crs::StatedVerticalCrs,
 };
+use crate::wording::range;
 
 /// Metres per unit of the heights. Where the file states several units or may have one of two, the key
 /// decides.
@@ -139,7 +140,7 @@ pub(super) fn other_units([low, high]: [f64; 2], usual_m: [f64; 2]) -> String {
     let fitting = candidates.iter().filter_map(|(word, unit)| {
         let [low_m, high_m] = [low, high].map(|value| value * unit.metres());
         (low_m >= usual_m[0] && high_m <= usual_m[1])
-            .then(|| format!("\"{word}\" makes {} to {} m", rounded(low_m), rounded(high_m)))
+            .then(|| format!("\"{word}\" makes {} m", range([low_m, high_m])))
     });
     let listed: Vec<String> = fitting.collect();
     if listed.is_empty() {
@@ -147,11 +148,6 @@ pub(super) fn other_units([low, high]: [f64; 2], usual_m: [f64; 2]) -> String {
     } else {
         format!("set scene.terrain.height_unit: {}", listed.join(", "))
     }
-}
-
-/// A number with at most four digits behind the point or none, as it is long or short.
-pub(super) fn rounded(value: f64) -> String {
-    if value.abs() >= 100.0 { format!("{value:.0}") } else { format!("{}", (value * 100.0).round() / 100.0) }
 }
 
 #[cfg(test)]

@@ -21,7 +21,10 @@ use super::{
     tiff_file::gdal_translate,
     tile::read_georeference,
 };
-use crate::pictures::{PictureError, StoredPicture, read_stored};
+use crate::{
+    pictures::{PictureError, StoredPicture, read_stored},
+    wording::joined_notes,
+};
 
 /// An ortho-image.
 pub(super) struct Ortho {
@@ -251,8 +254,7 @@ fn joined(paths: &[PathBuf], spec: &TerrainSpec, dem: &Dem) -> Result<Picture, T
         let affine = picture.model_from_pixel.unwrap_or(dem.model_from_pixel);
         grid_tiles::Placed::new(path, picture.texture.size_px, affine, crs)
     }))?;
-    let notes =
-        files::joined_notes(pictures.iter().map(|(path, _, picture)| (path.as_path(), &picture.notes[..])));
+    let notes = joined_notes(pictures.iter().map(|(path, _, picture)| (path.as_path(), &picture.notes[..])));
     let [width, height] = grid.size.map(|side| side as usize);
     let mut rgba8 = vec![0; 4 * width * height];
     let mut geo = GeoTags::default();
