@@ -213,7 +213,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
     let mut tree = serde_json::to_value(&scenario).unwrap();
     let mut visited = Vec::new();
     for_each_path(&mut tree, &mut |key, _| visited.push(key.replace(".0.", ".").replace(".1.", ".")));
-    for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
+    for (key, _) in keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::Path | ValueKind::Paths)) {
         assert!(visited.iter().any(|visited| visited == key), "{key}");
     }
     assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");

@@ -52,19 +52,24 @@ pub(super) fn backslash_advice(line: &str) -> Option<String> {
 
 /// The two ways to write a path with backslashes.
 fn advice(written: &str) -> String {
-    let slashes = written.replace("\\\\", "\\").replace('\\', "/");
+    // A path may begin with the name of a server: two backslashes that are no escape.
+    let slashes = match written.strip_prefix(r"\\") {
+        Some(rest) if !rest.starts_with('\\') => format!("//{rest}"),
+        _ => written.replace(r"\\", r"\"),
+    };
+    let slashes = slashes.replace('\\', "/");
     let literal = if written.contains('\'') { String::new() } else { format!("'{written}' or ") };
     format!("backslashes in \"...\" are escapes: write {literal}\"{slashes}\"")
 }
 
-/// A path of Windows on another system, if that is a file and the path as it is written is not.
+/// A path of Windows on another system, if that has its folder and not the path as it is written.
 pub(super) fn with_slashes(path: PathBuf) -> PathBuf {
     let text = path.to_string_lossy();
     if cfg!(windows) || !text.contains('\\') || path.exists() {
         return path;
     }
     let slashes = PathBuf::from(text.replace('\\', "/"));
-    if slashes.exists() { slashes } else { path }
+    if slashes.exists() || slashes.parent().is_some_and(Path::exists) { slashes } else { path }
 }
 
 #[cfg(test)]
@@ -105,6 +110,10 @@ mod tests {
             found(r#"log = "C:\Users\me.csv""#).ends_with(r#"write 'C:\Users\me.csv' or "C:/Users/me.csv""#)
         );
         assert!(found(r#"log = "C:\data\""#).contains(r"'C:\data\'"));
+        assert!(
+            found(r#"log = "\\server\logs\a.csv""#)
+                .ends_with(r#"'\\server\logs\a.csv' or "//server/logs/a.csv""#)
+        );
         assert!(found(r#"a = { dem = 'x', ortho = "d\o.tif" }"#).contains("\"d/o.tif\""));
         for line in [r"log = 'C:\Users'", r#"log = "a\\b""#, r#"log = "a" # "C:\x""#, "log = ", ""] {
             assert_eq!(found(line), "", "{line}");
@@ -119,6 +128,7 @@ mod tests {
         std::fs::write(folder.path().join("data/flight.csv"), "").unwrap();
         let found = |name: &str| with_slashes(folder.path().join(name));
         assert_eq!(found(r"data\flight.csv"), folder.path().join("data/flight.csv"));
-        assert_eq!(found(r"data\none.csv"), folder.path().join(r"data\none.csv"));
+        assert_eq!(found(r"data\*.csv"), folder.path().join("data/*.csv"));
+        assert_eq!(found(r"none\flight.csv"), folder.path().join(r"none\flight.csv"));
     }
 }

@@ -144,7 +144,17 @@ impl ColorBands {
             let kinds = image.extra.iter().enumerate().filter(|(_, extra)| **extra == kind);
             kinds.filter_map(|(k, _)| band(k)).find(|band| may_be_alpha(meanings.get(*band)))
         };
-        let alpha = band_named("Alpha").or_else(|| extra(UNASSOCIATED)).or_else(|| extra(ASSOCIATED));
+        let described_alpha = || {
+            meanings.iter().take(image.bands).position(|band| {
+                band.description
+                    .as_deref()
+                    .is_some_and(|text| described_words(text).contains(&"alpha".to_owned()))
+            })
+        };
+        let alpha = band_named("Alpha")
+            .or_else(|| extra(UNASSOCIATED))
+            .or_else(|| extra(ASSOCIATED))
+            .or_else(described_alpha);
         let is_premultiplied = alpha.is_some() && alpha == extra(ASSOCIATED);
         let described = described_rgb(image, meanings);
         let listed = quoted_descriptions(image, meanings).unwrap_or_default();
