@@ -284,16 +284,16 @@ pub fn read_terrain_in_light(
     let heights = dem.statistics();
     let path = dem.path.display();
     if heights.implausible > 0 && heights.implausible == dem.post_count() - missing(&heights) {
-        let problem = format!("its {}", implausible_values(&dem, &heights));
+        let problem = format!("its values are {}", implausible_values(&dem, &heights, ""));
         return Err(TerrainFileError::Meaning { path: dem.path.clone(), problem });
     }
     let ortho = spec.ortho.as_ref().map(|files| Ortho::read(files, spec, &dem)).transpose()?;
     let mut notes = dem.notes.clone();
     if heights.implausible > 0 {
         notes.push(format!(
-            "{path}: {} of its values are read as missing: {}",
+            "{path}: {} of its values are {}",
             heights.implausible,
-            implausible_values(&dem, &heights)
+            implausible_values(&dem, &heights, ", and are read as missing")
         ));
     }
     if heights.unlikely > 0 {
@@ -368,13 +368,13 @@ fn missing(heights: &HeightStatistics) -> u64 {
     heights.voids - heights.implausible
 }
 
-/// What implausible values are, and the units that would make heights of all values.
-fn implausible_values(dem: &Dem, heights: &HeightStatistics) -> String {
+/// What implausible values are, what is done with them, and the units that would make heights of all values.
+fn implausible_values(dem: &Dem, heights: &HeightStatistics, treatment: &str) -> String {
     let in_file = |range_m: [f64; 2]| range_m.map(|metres| metres / dem.unit_m());
     let all = in_file(union(heights.range_m, heights.implausible_range_m));
     let unit = if dem.unit_m() == 1.0 { "metres".to_owned() } else { format!("units of {} m", dem.unit_m()) };
     format!(
-        "values of {} are no plausible heights in {unit} (-11 500 to 9500 m): if they have another unit, {}",
+        "no plausible heights in {unit} (-11 500 to 9500 m), but {}{treatment}: if they have another unit, {}",
         range(in_file(heights.implausible_range_m)),
         height_unit::other_units(all, USUAL_HEIGHTS_M)
     )

@@ -53,7 +53,11 @@ fn faulty_scenes_are_read_or_refused_as_expected() {
         (
             "40-dem-centimetres",
             r#"terrain = { dem = "T07f_zstd_i32cm.tif", height = "msl" }"#,
-            Refused(&["values of 40000 to 46000", "scene.terrain.height_unit", "\"cm\" makes 400 to 460 m"]),
+            Refused(&[
+                "its values are no plausible heights in metres (-11 500 to 9500 m), but 40000 to 46000: ",
+                "scene.terrain.height_unit",
+                "\"cm\" makes 400 to 460 m",
+            ]),
         ),
         ("40-dem-centimetres", cm, Warns(&[])),
         (
@@ -103,8 +107,9 @@ fn units_of_citations_and_described_bands_are_applied() {
     let scene = r#"terrain = { dem = "T00_base.tif", ortho = "O7_bgrn.tif", height = "msl" }"#;
     let loaded = load("41-ortho-described-bgrn", scene).unwrap();
     let texture = &loaded.sequence.scene.terrain.as_ref().unwrap().texture;
-    assert_eq!(texture.size_px, [200, 160]);
-    assert_eq!(texture.rgba8[4 * (40 * 200 + 50)..][..3], [200, 150, 90]);
+    // The picture of 200 x 160 has a margin of 64 pixels.
+    assert_eq!(texture.size_px, [328, 288]);
+    assert_eq!(texture.rgba8[4 * (104 * 328 + 114)..][..3], [200, 150, 90]);
 }
 
 #[test]

@@ -90,6 +90,10 @@ fn meaning(path: &Path, problem: String) -> TerrainFileError {
 /// Tiles of different coordinate systems, pixel sizes or grids, with the command that joins them.
 pub(super) fn join<'a>(tiles: impl Iterator<Item = Placed<'a>>) -> Result<Joined, TerrainFileError> {
     let mut tiles: Vec<(usize, Placed<'a>)> = tiles.enumerate().collect();
+    if let [(_, only)] = &tiles[..] {
+        let (size, model_from_pixel) = (only.size, only.model_from_pixel);
+        return Ok(Joined { order: vec![0], offsets: vec![[0; 2]], size, model_from_pixel });
+    }
     let of_all = tiles.iter().map(|(_, tile)| tile.path).collect::<Vec<_>>();
     let command_paths = command_paths(&of_all);
     join_across_the_date_line(&mut tiles);
@@ -126,7 +130,8 @@ pub(super) fn join<'a>(tiles: impl Iterator<Item = Placed<'a>>) -> Result<Joined
                 let at = pixel(*corner);
                 [0, 1].map(|k: usize| (at[k] - start[k] - corner[k]).abs())
             })
-            .fold(0.0, f64::max);
+            .max_by(f64::total_cmp)
+            .unwrap_or(0.0);
         if off_px.is_nan() || off_px > MAX_OFFSET_PX {
             return Err(meaning(tile.path, off_grid(tile, first, off_px, &command_paths)));
         }

@@ -90,7 +90,7 @@ fn tiles_give_the_surface_of_one_file() {
                 );
             }
             // Nothing is open along the borders of tiles.
-            assert_eq!(loaded.terrain.indices, whole.terrain.indices);
+            assert_eq!((loaded.terrain.cells, loaded.terrain.void_cells), (whole.terrain.cells, 0));
         }
     }
 }
@@ -132,7 +132,7 @@ fn tiles_that_do_not_fit_are_refused_with_a_command() {
         (at(east.clone(), [4.4, 0.0]), "its pixels lie 0.40 pixels off those of"),
         (at(east.clone(), [4.7, 0.0]), "its pixels lie 0.30 pixels off those of"),
         (at(east.clone(), [1e6, 1e6]), "its tiles lie far apart"),
-        (east.clone().with_metadata(feet), "has heights in units of 0.3048 m, but those of"),
+        (east.clone().with_metadata(feet), "has heights in units of 1 m, but those of"),
     ] {
         let error = read_folder([west.clone(), other]).map(|loaded| loaded.notes).unwrap_err();
         assert!(error.contains(wanted), "{error}\n  lacks {wanted}");
