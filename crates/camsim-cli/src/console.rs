@@ -232,6 +232,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn warnings_are_printed_once_and_notes_as_often_as_they_are_given() {
+        let (mut out, mut err) = (Vec::new(), Vec::new());
+        let mut console = Console::new(&mut out, &mut err);
+        for _ in 0..2 {
+            console.warn("a\u{c}b");
+            console.note("n");
+        }
+        assert_eq!(String::from_utf8_lossy(&err), "warning: a\\u{c}b\nn\nn\n");
+    }
+
+    #[test]
     fn hints_contain_complete_commands() {
         let (mut out, mut err) = (Vec::new(), Vec::new());
         let mut console = Console::new(&mut out, &mut err);

@@ -45,8 +45,8 @@ pub(crate) const ITEMS: &[(&str, &str)] = &[
     ("`COLORINTERP` of a band (`<ColorInterp>`)", "applied: bands of red, green, blue, grey, alpha"),
     (
         "`DESCRIPTION` of a picture's bands (`<Description>`)",
-        "applied where it names red, green and blue (`Blue`, `B`, `Band 1: Blue`, `sr_blue`) and `COLORINTERP` does \
-         not; reported where the order is another than red, green, blue, or the colours are not known by them",
+        "applied where it names red, green and blue (`Blue`, `B`, `Band 1: Blue`, `sr_blue`), or alpha, and \
+         `COLORINTERP` does not; reported where the order is another than red, green, blue, or the colours are not known by them",
     ),
     ("`<NoDataValue>`", "applied, before the scale"),
     ("`<GeoTransform>`, `<SRS>`", "applied where the raster itself has none"),
