@@ -239,6 +239,7 @@ mod tests {
             console.warn("a\u{c}b");
             console.note("n");
         }
+        drop(console);
         assert_eq!(String::from_utf8_lossy(&err), "warning: a\\u{c}b\nn\nn\n");
     }
 
