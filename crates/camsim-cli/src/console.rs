@@ -26,8 +26,10 @@ pub struct Console<'a> {
     camera: Option<String>,
     /// The variation of a random scenario that messages are about.
     variation: Option<u64>,
-    /// Of a series of variations: what has been said, and is not said again.
-    said: Option<HashSet<String>>,
+    /// Whether variations follow each other.
+    is_series: bool,
+    /// Warnings, and all notes of a series of variations, that have been printed and are not printed again.
+    said: HashSet<String>,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -51,7 +53,8 @@ impl<'a> Console<'a> {
             scenario: None,
             camera: None,
             variation: None,
-            said: None,
+            is_series: false,
+            said: HashSet::new(),
         }
     }
 
@@ -77,7 +80,7 @@ impl<'a> Console<'a> {
 
     /// From now on a note that several variations have is printed once, with the number of the first.
     pub fn begin_series(&mut self) {
-        self.said = Some(HashSet::new());
+        self.is_series = true;
     }
 
     /// The command line as typed.
@@ -162,28 +165,30 @@ impl<'a> Console<'a> {
         if self.quiet {
             return;
         }
-        let text = text.to_string();
-        match (&mut self.said, self.variation) {
-            (Some(said), Some(index)) => {
-                let is_new = said.insert(text.clone());
-                if is_new {
+        let text = visible(&text.to_string());
+        match self.variation.filter(|_| self.is_series) {
+            None => self.complain(&format!("{text}\n")),
+            Some(index) => {
+                if self.said.insert(text.clone()) {
                     self.complain(&format!("variation {index}: {text}\n"));
                 }
             }
-            _ => self.complain(&format!("{text}\n")),
         }
     }
 
     /// Prints a note to standard error with `-v` only.
     pub fn detail(&mut self, text: impl fmt::Display) {
         if self.verbose {
-            self.complain(&format!("{text}\n"));
+            self.complain(&format!("{}\n", visible(&text.to_string())));
         }
     }
 
-    /// Prints a warning to standard error, unless `-q`.
+    /// Prints a warning to standard error, unless `-q`, once.
     pub fn warn(&mut self, text: impl fmt::Display) {
-        self.note(format_args!("warning: {text}"));
+        let text = format!("warning: {text}");
+        if self.is_series || self.said.insert(text.clone()) {
+            self.note(text);
+        }
     }
 
     /// Prints a text to standard error, even with `-q`. Errors of that stream are ignored.
@@ -198,9 +203,16 @@ impl<'a> Console<'a> {
         if failure.is_broken_pipe() {
             return DONE;
         }
-        self.complain(&format!("{}\n", self.whole(&failure.to_string())));
+        self.complain(&format!("{}\n", self.whole(&visible(&failure.to_string()))));
         failure.code()
     }
+}
+
+/// A text with its control characters as escapes: they may be those of a file's name.
+fn visible(text: &str) -> String {
+    let shown =
+        |c: char| if c.is_control() && c != '\n' { c.escape_default().collect() } else { c.to_string() };
+    text.chars().map(shown).collect()
 }
 
 /// A word quoted for a shell.
@@ -218,6 +230,18 @@ pub fn quoted(word: &OsStr) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn warnings_are_printed_once_and_notes_as_often_as_they_are_given() {
+        let (mut out, mut err) = (Vec::new(), Vec::new());
+        let mut console = Console::new(&mut out, &mut err);
+        for _ in 0..2 {
+            console.warn("a\u{c}b");
+            console.note("n");
+        }
+        drop(console);
+        assert_eq!(String::from_utf8_lossy(&err), "warning: a\\u{c}b\nn\nn\n");
+    }
 
     #[test]
     fn hints_contain_complete_commands() {

@@ -71,14 +71,14 @@ impl Geodetic {
         )
     }
 
-    /// Inverse of [`Self::to_ecef`].
+    /// The place of a position in metres from the Earth's centre: x towards latitude and longitude 0, z north.
     ///
     /// Bowring's iteration on the reduced latitude beta (Bowring 1976, Survey Review 23:323-327), run to
     /// convergence: `tan lat = (z + e'^2 b sin^3 beta) / (p - e2 a cos^3 beta)`, `tan beta = (1 - f) tan
     /// lat`. The height is `p cos lat + z sin lat - a sqrt(1 - e2 sin^2 lat)`, which is well conditioned at
     /// the poles and on the equator alike. Valid farther than 43 km from the earth's centre (inside the
     /// evolute the solution is not unique); finite everywhere.
-    pub(crate) fn from_ecef(ecef_m: DVec3) -> Self {
+    pub fn from_ecef(ecef_m: DVec3) -> Self {
         let semi_minor_m = WGS84_A_M * (1.0 - WGS84_F);
         let second_e2 = WGS84_E2 / (1.0 - WGS84_E2);
         let from_axis_m = ecef_m.x.hypot(ecef_m.y);

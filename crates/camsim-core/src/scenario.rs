@@ -16,6 +16,7 @@ mod camera;
 mod channel;
 mod dataset;
 mod face;
+mod file_list;
 mod image_sensor;
 mod motion;
 mod optics;
@@ -38,6 +39,7 @@ pub use camera::{
 pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
 pub use dataset::DatasetFormat;
 pub use face::Face;
+pub use file_list::FileList;
 pub use image_sensor::{
     Companding, Demosaic, FlickerSpec, FlickerWave, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve,
     SensorModel,

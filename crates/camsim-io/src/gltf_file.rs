@@ -22,6 +22,7 @@ mod accessor;
 mod asset;
 mod bake;
 mod emissive;
+mod foreign;
 mod material;
 mod moving;
 mod normals;
@@ -180,6 +181,23 @@ impl Model {
         })
     }
 
+    /// Spacing of the 32-bit numbers that hold the largest coordinate of a vertex, metres of the model.
+    #[must_use]
+    pub fn spacing_m(&self) -> f64 {
+        let spacing = |part: &Part| {
+            let bounds = part.shape.bounds();
+            let largest = bounds.min.abs().max(bounds.max.abs()).max_element() as f32;
+            let next = f32::from_bits(largest.to_bits().saturating_add(1));
+            let is_finite = largest.is_finite() && next.is_finite();
+            if is_finite {
+                f64::from(next - largest) * part.model_from_shape.matrix3.x_axis.length()
+            } else {
+                0.0
+            }
+        };
+        self.parts.iter().map(spacing).fold(0.0, f64::max)
+    }
+
     /// Number of triangles.
     #[must_use]
     pub fn triangles(&self) -> usize {
@@ -207,7 +225,7 @@ pub fn read_moving_gltf(path: &Path, options: GltfOptions, motion: &ModelMotion)
 
 // Long because it is the list of what a file consists of and of what is said about it.
 fn read(path: &Path, options: GltfOptions, motion: &ModelMotion) -> Result<Model, GltfError> {
-    let asset = Asset::read(path)?;
+    let asset = Asset::read(path, options.normals)?;
     let periods_s = if motion.animate { moving::periods_s(&asset)? } else { Vec::new() };
     let options = GltfOptions { time_s: options.time_s.or(motion.animate.then_some(0.0)), ..options };
     let broken = |message: String| GltfError::Broken { path: path.into(), message };

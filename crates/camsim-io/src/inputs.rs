@@ -11,7 +11,10 @@ use std::{
 use camsim_core::scenario::{PointSource, Scenario};
 use rayon::prelude::*;
 
-use crate::{gltf_file::referenced_files, terrain::sidecar_files};
+use crate::{
+    gltf_file::referenced_files,
+    terrain::{files::terrain_files, sidecar_files},
+};
 
 /// Fingerprints of files by their paths.
 pub type Inputs = BTreeMap<String, String>;
@@ -30,9 +33,11 @@ pub fn scenario_fingerprints(scenario: &Scenario) -> Inputs {
     paths.extend(scenario.camera.lens_table.iter().map(|table| table.path.clone()));
     let spread = scenario.camera.point_spread.as_ref();
     paths.extend(spread.and_then(|spread| spread.kernel.as_ref()).map(|file| file.path.clone()));
-    for picture in scene.terrain.iter().flat_map(|terrain| terrain.ortho.iter().chain([&terrain.dem])) {
-        paths.push(picture.clone());
-        paths.extend(sidecar_files(picture));
+    if let Some(terrain) = &scene.terrain {
+        for raster in terrain_files(&terrain.dem, terrain.ortho.as_ref()) {
+            paths.extend(sidecar_files(&raster));
+            paths.push(raster);
+        }
     }
     paths.extend(scene.pattern.iter().map(|pattern| pattern.image.clone()));
     paths.extend(scene.board.iter().filter_map(|board| board.target.clone()));

@@ -28,10 +28,11 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod coverage;
+mod far_models;
 mod motion;
 mod objects;
 mod optics;
-mod ortho_coverage;
 mod placements;
 mod pose_table;
 mod scene;
@@ -558,8 +559,9 @@ fn warnings(
             sequence.frames
         ));
     }
-    warnings.extend(terrain.and_then(|summary| ortho_coverage::ortho_coverage_warning(sequence, summary)));
+    warnings.extend(terrain.and_then(|summary| coverage::ortho_warning(sequence, summary)));
     warnings.extend(terrain.and_then(|summary| flight_over_terrain_warning(sequence, summary)));
+    warnings.extend(coverage::sky_warning(sequence));
     warnings
 }
 

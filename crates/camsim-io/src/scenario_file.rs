@@ -11,6 +11,7 @@ use camsim_core::scenario::{CameraSpec, Preset, Problem, Rig, Scenario, validate
 use thiserror::Error;
 
 pub(crate) mod check;
+mod escapes;
 mod paths;
 mod randomize;
 mod rig;

@@ -2,13 +2,17 @@
 
 mod arc_prj;
 mod bands;
+mod citations;
 mod crs;
 mod dem;
 mod descriptions;
 mod documentation;
+pub(crate) mod files;
 mod geo_tags;
 mod georeference;
+mod grid_tiles;
 mod height_files;
+mod height_unit;
 mod hillshade;
 mod metadata;
 mod ortho;
@@ -16,6 +20,7 @@ pub(crate) mod raster;
 mod sidecar;
 mod stated_crs;
 mod tiff_file;
+mod tile;
 mod units;
 mod vertical_crs;
 mod wkt;
@@ -34,12 +39,13 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use crate::pictures::PictureError;
+use crate::{pictures::PictureError, wording::range};
 pub use documentation::documentation;
 pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
+pub(crate) use tiff_file::quoted;
 pub(crate) use units::metres_per_unit_name;
 
-use dem::{Dem, EMPTY_RANGE, HeightStatistics, widened};
+use dem::{Dem, EMPTY_RANGE, HeightStatistics, USUAL_HEIGHTS_M, union, widened};
 use ortho::Ortho;
 
 /// NED position (metres) of latitude, longitude (radians) and ellipsoidal height (metres).
@@ -65,6 +71,8 @@ pub struct LoadedTerrain {
 pub struct TerrainSummary {
     /// EPSG code of the DEM's coordinate system.
     pub epsg: u16,
+    /// The files of its heights; several are tiles of one grid.
+    pub files: Vec<PathBuf>,
     /// Number of columns (west to east) and rows (north to south).
     pub size: [u32; 2],
     /// Latitude, longitude of the south-western corner of the bounding rectangle, radians.
@@ -274,21 +282,24 @@ pub fn read_terrain_in_light(
 ) -> Result<LoadedTerrain, TerrainFileError> {
     let dem = Dem::read(spec, height_shift.is_some())?;
     let heights = dem.statistics();
-    let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, spec, &dem)).transpose()?;
+    let path = dem.path.display();
+    if heights.implausible > 0 && heights.implausible == dem.post_count() - missing(&heights) {
+        let problem = format!("its values are {}", implausible_values(&dem, &heights, ""));
+        return Err(TerrainFileError::Meaning { path: dem.path.clone(), problem });
+    }
+    let ortho = spec.ortho.as_ref().map(|files| Ortho::read(files, spec, &dem)).transpose()?;
     let mut notes = dem.notes.clone();
     if heights.implausible > 0 {
         notes.push(format!(
-            "{}: {} of its values are no plausible heights in metres (-11 500 to 9500) and are read as \
-             missing: if they have another unit, set scene.terrain.height_unit",
-            spec.dem.display(),
-            heights.implausible
+            "{path}: {} of its values are {}",
+            heights.implausible,
+            implausible_values(&dem, &heights, ", and are read as missing")
         ));
     }
     if heights.unlikely > 0 {
         notes.push(format!(
-            "{}: {} of its heights are below -500 m or above 9000 m: unless they are sea floor, check \
+            "{path}: {} of its heights are below -500 m or above 9000 m: unless they are sea floor, check \
              scene.terrain.height_unit and the file's no-data value",
-            spec.dem.display(),
             heights.unlikely
         ));
     }
@@ -304,15 +315,15 @@ pub fn read_terrain_in_light(
     let outside_ortho = ortho
         .as_ref()
         .map_or(0, |ortho| dem.count(|post| !dem.height_m(post).is_nan() && !ortho.covers(&dem, post)));
-    if let Some(path) =
-        spec.ortho.as_ref().filter(|_| outside_ortho > 0 && outside_ortho == dem.post_count() - heights.voids)
+    if let Some(ortho) =
+        ortho.as_ref().filter(|_| outside_ortho > 0 && outside_ortho == dem.post_count() - heights.voids)
     {
-        return Err(TerrainFileError::NoOverlap { ortho: path.clone(), dem: dem.path.clone() });
+        return Err(TerrainFileError::NoOverlap { ortho: ortho.path.clone(), dem: dem.path.clone() });
     }
     let texture = match &ortho {
         Some(ortho) => {
             notes.extend(ortho.notes.iter().cloned());
-            notes.extend(spec.ortho.as_ref().filter(|_| outside_ortho > 0).map(|path| {
+            notes.extend((outside_ortho > 0).then(|| {
                 let share = 100.0 * outside_ortho as f64 / (dem.post_count() - heights.voids) as f64;
                 let (is, others) = match spec.beyond {
                     Beyond::Grey => ("grey", "\"edge\" or \"void\""),
@@ -322,7 +333,7 @@ pub fn read_terrain_in_light(
                 format!(
                     "{}: {share:.2} % of the terrain's area has no ortho-image and is {is} \
                      (scene.terrain.beyond; alternatives: {others})",
-                    path.display()
+                    ortho.path.display()
                 )
             }));
             ortho.texture.clone()
@@ -345,11 +356,28 @@ pub fn read_terrain_in_light(
             count: dem.count_outside_crs(),
         });
     }
-    let mut terrain = terrain.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
+    let mut terrain = terrain.map_err(|source| TerrainFileError::Grid { path: dem.path.clone(), source })?;
     terrain.beyond = ortho.as_ref().and_then(Ortho::margin_color);
     let texture_scale = light.map_or(1, |light| terrain.bake_light(light));
     let summary = TerrainSummary { texture_scale, ..grid.summary(&heights, outside_ortho) };
     Ok(LoadedTerrain { terrain, summary, notes })
+}
+
+/// Number of heights without a value that may be one in another unit.
+fn missing(heights: &HeightStatistics) -> u64 {
+    heights.voids - heights.implausible
+}
+
+/// What implausible values are, what is done with them, and the units that would make heights of all values.
+fn implausible_values(dem: &Dem, heights: &HeightStatistics, treatment: &str) -> String {
+    let in_file = |range_m: [f64; 2]| range_m.map(|metres| metres / dem.unit_m());
+    let all = in_file(union(heights.range_m, heights.implausible_range_m));
+    let unit = if dem.unit_m() == 1.0 { "metres".to_owned() } else { format!("units of {} m", dem.unit_m()) };
+    format!(
+        "no plausible heights in {unit} (-11 500 to 9500 m), but {}{treatment}: if they have another unit, {}",
+        range(in_file(heights.implausible_range_m)),
+        height_unit::other_units(all, USUAL_HEIGHTS_M)
+    )
 }
 
 /// Posts of a DEM as NED points, computed on demand.
@@ -411,6 +439,7 @@ impl Grid<'_> {
         let height_m = 0.5 * (heights.range_m[0] + heights.range_m[1]) + self.shift_m(centre_rad);
         TerrainSummary {
             epsg: dem.crs.epsg,
+            files: dem.files(),
             size: dem.size,
             south_west_rad: [south, west],
             north_east_rad: [north, east],

@@ -37,8 +37,8 @@ fn files_of_the_scenarios_exist() {
                 (scenario.flight.height, terrain.height),
                 (HeightReference::Msl, HeightReference::Msl)
             );
-            files.push(terrain.dem);
-            files.extend(terrain.ortho);
+            files.extend(terrain.dem.paths().iter().cloned());
+            files.extend(terrain.ortho.iter().flat_map(|ortho| ortho.paths().to_vec()));
         }
         for file in files {
             assert!(asset(&file).is_file(), "{name} names {}", file.display());

@@ -18,11 +18,11 @@ fn field(name: &str) -> PathBuf {
 }
 
 fn spec(dem: &str) -> TerrainSpec {
-    TerrainSpec { dem: field(dem), ..TerrainSpec::default() }
+    TerrainSpec { dem: field(dem).into(), ..TerrainSpec::default() }
 }
 
 fn with_ortho(ortho: &str) -> TerrainSpec {
-    TerrainSpec { ortho: Some(field(ortho)), ..spec("ortho/dem.tif") }
+    TerrainSpec { ortho: Some(field(ortho).into()), ..spec("ortho/dem.tif") }
 }
 
 /// Reads with a local frame near 47 N, 9 E whose down is the negative height.
@@ -205,7 +205,7 @@ fn lossy_compressions_are_read() {
 #[test]
 fn longitudes_of_190_and_minus_170_degrees_are_equal() {
     let loaded = read_terrain(
-        &TerrainSpec { ortho: Some(field("ortho/o_170.tif")), ..spec("ortho/d_190.tif") },
+        &TerrainSpec { ortho: Some(field("ortho/o_170.tif").into()), ..spec("ortho/d_190.tif") },
         &|lat, lon, height| {
             DVec3::new(6.37e6 * (lat - (-17f64).to_radians()), 6.37e6 * (lon - 190f64.to_radians()), -height)
         },
@@ -240,7 +240,7 @@ fn small_picture(folder: &Path) -> PathBuf {
 #[test]
 fn ground_outside_of_the_ortho_image_follows_the_key() {
     let folder = tempfile::tempdir().unwrap();
-    let spec = TerrainSpec { ortho: Some(small_picture(folder.path())), ..spec("ortho/dem.tif") };
+    let spec = TerrainSpec { ortho: Some(small_picture(folder.path()).into()), ..spec("ortho/dem.tif") };
     let share = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
     let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
     for (beyond, expected) in [
@@ -384,8 +384,9 @@ fn published_terrains_agree_with_gdal() {
         ),
     ];
     for (dem, heights, colors) in cases {
-        let ortho = colors.map(|(ortho, _)| data.join("terrain").join(ortho));
-        let spec = TerrainSpec { dem: data.join("terrain").join(dem), ortho, ..TerrainSpec::default() };
+        let ortho = colors.map(|(ortho, _)| data.join("terrain").join(ortho).into());
+        let spec =
+            TerrainSpec { dem: data.join("terrain").join(dem).into(), ortho, ..TerrainSpec::default() };
         let ned = |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.8) * 1e6, lon * 1e6, -height);
         let loaded = read_terrain(&spec, &ned, None).unwrap();
         for (pixel, expected) in heights {

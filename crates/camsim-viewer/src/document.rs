@@ -345,7 +345,8 @@ fn path_keys(tree: &Table) -> Vec<String> {
             (0..count).map(|index| format!("{list}.{index}.{leaf}")).collect()
         }
     });
-    let mixed = keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::WordsOrTables(_)));
+    let mixed =
+        keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::WordsOrTables(_) | ValueKind::Paths));
     let tables = mixed.flat_map(|(key, kind)| match get_key(tree, key) {
         Some(Value::String(text)) if kind.is_path(text) => vec![(*key).to_owned()],
         Some(Value::Array(list)) => {

@@ -574,8 +574,8 @@ pub const PARAMS: &[Param] = &[
         0.005,
         "that of blue; left out: that of all",
     ),
-    param("scene.terrain.dem", "", ANY, 1.0, "GeoTIFF of heights"),
-    param("scene.terrain.ortho", "", ANY, 1.0, "orthophoto of the terrain"),
+    param("scene.terrain.dem", "", ANY, 1.0, "heights: a GeoTIFF, or a list of tiles"),
+    param("scene.terrain.ortho", "", ANY, 1.0, "orthophoto of the terrain, or a list of tiles"),
     param("scene.terrain.height", "", ANY, 1.0, "vertical datum of the terrain's heights"),
     param("scene.terrain.epsg", "", [0.0, 65_535.0], 1.0, "coordinate system, if the file has none"),
     param("scene.terrain.height_unit", "", ANY, 1.0, "unit of the heights, if the file has none"),
@@ -600,6 +600,7 @@ pub const PARAMS: &[Param] = &[
     param("scene.pattern.at", "m", ANY, 1.0, "centre of the pattern: the origin, or north, east, down"),
     param("scene.pattern.name", "", ANY, 1.0, "name of the object in objects.csv; default: pattern"),
     param("scene.pattern.class", "", CLASS, 0.2, "class of the object, 1 to 65535"),
+    param("scene.pattern.repeat", "", ANY, 1.0, "whether the image repeats to the horizon"),
     param("scene.board.target", "", ANY, 1.0, "Kalibr's target YAML, in place of the keys below"),
     param("scene.board.kind", "", ANY, 1.0, "kind of calibration board"),
     param(

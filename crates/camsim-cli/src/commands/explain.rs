@@ -4,6 +4,8 @@ mod camera;
 mod sensors;
 mod twins;
 
+use std::path::PathBuf;
+
 use camsim_core::{
     scenario::{Auto, Face, LightSpec, Solver},
     scene::{self, ModelLod, SceneLods, TerrainDetail, TerrainTiles, TexelForm, tile_bytes},
@@ -189,6 +191,7 @@ struct MemoryFacts {
 
 #[derive(Serialize)]
 struct TerrainFacts {
+    files: Vec<PathBuf>,
     epsg: u16,
     size: [u32; 2],
     south_west_deg: [f64; 2],
@@ -426,6 +429,12 @@ fn print_terrain(terrain: &TerrainFacts, console: &mut Console<'_>) -> Result<()
     let TerrainFacts { epsg, size: [columns, rows], south_west_deg, north_east_deg, height_range_m, .. } =
         terrain;
     console.line(format_args!("terrain of {columns}x{rows} heights, EPSG:{epsg}"))?;
+    if let [_, _, ..] = &terrain.files[..] {
+        console.line(format_args!("  {} tiles", terrain.files.len()))?;
+        for file in &terrain.files {
+            console.line(format_args!("    {}", file.display()))?;
+        }
+    }
     console.line(format_args!(
         "  latitude {:.5} to {:.5}, longitude {:.5} to {:.5} deg, heights {:.1} to {:.1} m",
         south_west_deg[0],
@@ -539,6 +548,7 @@ fn log_facts(loaded: &Loaded) -> LogFacts {
 fn terrain_facts(summary: &TerrainSummary) -> TerrainFacts {
     let [columns, rows] = summary.size.map(|heights| u64::from(heights.saturating_sub(1)));
     TerrainFacts {
+        files: summary.files.clone(),
         epsg: summary.epsg,
         size: summary.size,
         south_west_deg: summary.south_west_rad.map(f64::to_degrees),

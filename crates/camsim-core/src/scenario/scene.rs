@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::MotionSpec;
+use super::{FileList, MotionSpec};
 
 /// The scene: one of its parts, or several together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -63,11 +63,12 @@ impl Default for LightSpec {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainSpec {
-    /// Heights: a GeoTIFF, ESRI ASCII grid or SRTM tile.
-    pub dem: PathBuf,
-    /// Colour: a GeoTIFF, PNG, JPEG or WebP. Without a georeference it covers the extent of the DEM.
+    /// Heights: a GeoTIFF, ESRI ASCII grid or SRTM tile, or several tiles of one grid.
+    pub dem: FileList,
+    /// Colour: a GeoTIFF, PNG, JPEG or WebP, or several tiles of one grid. Without a georeference it covers the
+    /// extent of the DEM.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ortho: Option<PathBuf>,
+    pub ortho: Option<FileList>,
     /// Vertical reference of the DEM.
     #[serde(default)]
     pub height: HeightReference,
@@ -101,6 +102,12 @@ pub enum HeightUnit {
     Ft,
     /// US survey feet.
     UsFt,
+    /// Decimetres.
+    Dm,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
 }
 
 impl HeightUnit {
@@ -111,6 +118,9 @@ impl HeightUnit {
             Self::M => 1.0,
             Self::Ft => 0.3048,
             Self::UsFt => 1200.0 / 3937.0,
+            Self::Dm => 0.1,
+            Self::Cm => 0.01,
+            Self::Mm => 0.001,
         }
     }
 }
@@ -145,6 +155,9 @@ pub struct PatternSpec {
     /// Class of the object, 1 to 65535; left out: 0, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
+    /// Whether the image repeats over the plane, without seams, to the horizon.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub repeat: bool,
 }
 
 /// `scene.board`: a calibration board, by its parameters or by a target file of Kalibr.

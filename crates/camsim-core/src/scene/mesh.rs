@@ -141,6 +141,30 @@ impl Material {
     }
 }
 
+/// How far a repeated image reaches from its centre, metres: from a height of 1 km to a third of a degree below the
+/// horizon.
+const REPEATED_REACH_M: f64 = 2e5;
+
+/// Growth of the cells of a repeated image: each is this share of its distance from the centre.
+const REPEATED_GROWTH: f64 = 0.5;
+
+/// Largest number of copies of a repeated image from its centre: 32-bit numbers hold whole ones.
+const MOST_COPIES: f64 = 8e6;
+
+/// Borders of the cells of a repeated image of a given side, in whole copies, from the middle one's, 0 and 1, to both
+/// sides.
+fn cell_borders(side_m: f64) -> Vec<f64> {
+    let reach = (REPEATED_REACH_M / side_m).ceil().clamp(1.0, MOST_COPIES);
+    let mut outwards = vec![0.0];
+    let mut at = 0.0;
+    while at < reach {
+        at = (at + (at * REPEATED_GROWTH).floor().max(1.0)).min(reach);
+        outwards.push(at);
+    }
+    let before = outwards.iter().rev().map(|copies| -copies);
+    before.chain(outwards.iter().map(|copies| 1.0 + copies)).collect()
+}
+
 /// A placed shape with a material.
 #[derive(Clone, Debug)]
 pub struct Mesh {
@@ -227,6 +251,32 @@ impl Mesh {
         let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
         // The diagonal runs from north-west to south-east, as in the terrain.
         Self::new(vertices, vec![0, 3, 1, 0, 2, 3], texture, centre_ned_m, Wrap::Clamp)
+    }
+
+    /// As [`Mesh::level_picture`], but the image repeats in both directions, 200 km far. Its cells
+    /// grow with their distance from the centre; each has texture coordinates of its own near 0, so that 32-bit
+    /// numbers place the image as well in the distance as nearby.
+    pub fn repeated_picture(texture: Arc<Texture>, centre_ned_m: DVec3, width_m: f64) -> Self {
+        let [width_px, height_px] = texture.size_px.map(f64::from);
+        let height_m = width_m * height_px / width_px;
+        // Borders of cells in copies of the image, of which the middle one has 0 and 1.
+        let [across, down] = [width_m, height_m].map(cell_borders);
+        let mut vertices = Vec::new();
+        let mut indices = Vec::new();
+        for rows in down.windows(2) {
+            for columns in across.windows(2) {
+                let first = vertices.len() as u32;
+                for (v, u) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    let (row, column) = (rows[v], columns[u]);
+                    let north = (height_m * (0.5 - row)) as f32;
+                    let east = (width_m * (column - 0.5)) as f32;
+                    let uv = [(column - columns[0]) as f32, (row - rows[0]) as f32];
+                    vertices.push(MeshVertex::new([north, east, 0.0], uv));
+                }
+                indices.extend([0, 3, 1, 0, 2, 3].map(|corner| first + corner));
+            }
+        }
+        Self::new(vertices, indices, texture, centre_ned_m, Wrap::Repeat)
     }
 
     /// First intersection with `origin + t direction`, 0 <= t <= `t_max`, from either side: t and the texture
@@ -360,6 +410,29 @@ mod tests {
             })
             .sum();
         assert!((area.abs() - 800.0).abs() < 1e-9, "{area}");
+    }
+
+    #[test]
+    fn repeated_picture_has_the_same_image_everywhere() {
+        let texture = Arc::new(Texture { size_px: [4, 2], rgba8: vec![255; 32], encoding: Encoding::Srgb });
+        let centre = DVec3::new(100.0, -50.0, 3.0);
+        let one = Mesh::level_picture(texture.clone(), centre, 40.0);
+        let many = Mesh::repeated_picture(texture, centre, 40.0);
+        let uv = |mesh: &Mesh, north: f64, east: f64| {
+            let from = centre + DVec3::new(north, east, -10.0);
+            mesh.intersect(from, DVec3::Z, 20.0).expect("hit").1
+        };
+        // Copies are 20 m high and 40 m wide; 32-bit numbers hold 200 km to 8 mm.
+        for [rows, columns] in [[0.0, 0.0], [1.0, -1.0], [-7.0, 3.0], [1000.0, -77.0], [9999.0, 4999.0]] {
+            for [north, east] in [[3.0, -11.0], [-9.0, 19.0]] {
+                let [u, v] = uv(&one, north, east);
+                let [far_u, far_v] = uv(&many, north + 20.0 * rows, east + 40.0 * columns);
+                let off = [far_u - u, far_v - v].map(|by| (by - by.round()).abs());
+                assert!(off.iter().all(|by| *by < 1e-3), "{rows} {columns}: {off:?}");
+            }
+        }
+        let reach = many.bounds().max - centre;
+        assert!(reach.x >= REPEATED_REACH_M && reach.y >= REPEATED_REACH_M, "{reach}");
     }
 
     #[test]

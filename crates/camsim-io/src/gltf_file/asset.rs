@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde_json::Value;
 
-use super::{GltfError, accessor, preprocess::preprocess, treatments, validation};
+use super::{GltfError, accessor, foreign, preprocess::preprocess, treatments, validation};
 use crate::similar_file::suggestion;
 
 /// A parsed file with its buffers.
@@ -20,7 +20,8 @@ pub(super) struct Asset {
 }
 
 impl Asset {
-    pub fn read(path: &Path) -> Result<Self, GltfError> {
+    /// Reads a file. `is_lit` is whether it is shown in a scene with light.
+    pub fn read(path: &Path, is_lit: bool) -> Result<Self, GltfError> {
         let bytes = read_file(path)?;
         let broken = |message: String| GltfError::Broken { path: path.into(), message };
         if bytes.is_empty() {
@@ -29,12 +30,16 @@ impl Asset {
         let is_glb = bytes.starts_with(b"glTF");
         let (text, binary_chunk) =
             if is_glb { split_glb(&bytes).map_err(broken)? } else { (&bytes[..], None) };
-        let mut json: Value = serde_json::from_slice(without_byte_order_mark(text))
-            .map_err(|error| broken(format!("is no glTF: {error}")))?;
+        let mut json: Value = serde_json::from_slice(without_byte_order_mark(text)).map_err(|error| {
+            broken(foreign::message(path, &bytes).unwrap_or_else(|| format!("is no glTF: {error}")))
+        })?;
+        if let Some(message) = foreign::json_message(path, &json) {
+            return Err(broken(message));
+        }
         validation::check_extensions(path, &json, binary_chunk.is_some())?;
         validation::check_version(&json).map_err(broken)?;
         validation::check_indices(&json).map_err(broken)?;
-        let mut notes = treatments::notes(&json);
+        let mut notes = treatments::notes(&json, is_lit);
         let preprocessed = preprocess(&mut json).map_err(broken)?;
         notes.extend(preprocessed.notes);
         let root = serde_json::from_value(json.clone())

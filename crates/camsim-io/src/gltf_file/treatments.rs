@@ -102,7 +102,8 @@ pub(super) const PROPERTIES: &[SupportRow] = &[
     ("weights, targets", Applied, "POSITION and NORMAL; other targets are reported"),
     ("animations", Applied, "at time_s; without it nodes keep their static transforms, and that is reported"),
     ("scene, scenes", Applied, "scene.gltf.scene, or the file's default scene"),
-    ("metallicFactor, metallicRoughnessTexture", Reported, "colour is albedo"),
+    ("metallicFactor", Reported, "with the scene's light; else irrelevant: colour is albedo"),
+    ("metallicRoughnessTexture", Reported, "colour is albedo"),
     ("roughnessFactor", Irrelevant, "gloss alone: colour is albedo"),
     ("normalTexture", Reported, "the scene's light uses the surface's own normals"),
     ("occlusionTexture", Reported, "the sky is hidden from nothing"),
@@ -153,10 +154,10 @@ fn collect_extensions<'a>(value: &'a Value, names: &mut BTreeSet<&'a str>) {
 }
 
 /// Notes about parts of the file that are ignored, each once.
-pub(super) fn notes(json: &Value) -> Vec<String> {
+pub(super) fn notes(json: &Value, is_lit: bool) -> Vec<String> {
     let mut names = BTreeSet::new();
     collect_extensions(json, &mut names);
-    let (mut shading, mut notes) = (shading_properties(json), Vec::new());
+    let (mut shading, mut notes) = (shading_properties(json, is_lit), Vec::new());
     for name in names {
         match extension_row(name) {
             Some(("KHR_materials_*", ..)) => drop(shading.insert(name)),
@@ -190,8 +191,9 @@ pub(super) fn notes(json: &Value) -> Vec<String> {
     notes
 }
 
-/// Shading properties of the materials that are not unlit; they are ignored.
-fn shading_properties(json: &Value) -> BTreeSet<&str> {
+/// Shading properties of the materials that are not unlit; they are ignored. Without light a metal looks as it is
+/// painted: how much of one it is changes nothing.
+fn shading_properties(json: &Value, is_lit: bool) -> BTreeSet<&str> {
     let mut names = BTreeSet::new();
     for material in list(json, "materials") {
         if material.pointer("/extensions/KHR_materials_unlit").is_some() {
@@ -208,10 +210,11 @@ fn shading_properties(json: &Value) -> BTreeSet<&str> {
             ("metallicRoughnessTexture", has("/pbrMetallicRoughness/metallicRoughnessTexture")),
             (
                 "metallicFactor",
-                material
-                    .pointer("/pbrMetallicRoughness/metallicFactor")
-                    .and_then(Value::as_f64)
-                    .is_some_and(|f| f > 0.0),
+                is_lit
+                    && material
+                        .pointer("/pbrMetallicRoughness/metallicFactor")
+                        .and_then(Value::as_f64)
+                        .is_some_and(|f| f > 0.0),
             ),
         ];
         names.extend(properties.into_iter().filter(|(_, has)| *has).map(|(name, _)| name));

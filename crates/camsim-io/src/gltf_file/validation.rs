@@ -18,9 +18,9 @@ pub(super) fn check_version(json: &Value) -> Result<(), String> {
     let text = |key: &str| json.pointer(&format!("/asset/{key}")).and_then(Value::as_str);
     match (text("version"), text("minVersion")) {
         (None, _) => Err("has no asset.version: it is not a glTF 2.0 file".into()),
-        (Some(version), _) if !version.starts_with("2.") => {
-            Err(format!("is glTF {version}, not 2.0: convert it"))
-        }
+        (Some(version), _) if !version.starts_with("2.") => Err(format!(
+            "is glTF {version}, not 2.0: convert it with `npx gltf-pipeline -i IN -o OUT.gltf`, which writes 2.0"
+        )),
         (_, Some(minimum)) if minimum != "2.0" => {
             Err(format!("needs glTF {minimum} (asset.minVersion), but 2.0 is supported: convert it"))
         }

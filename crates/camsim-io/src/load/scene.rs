@@ -14,7 +14,9 @@ use camsim_core::{
 use glam::DVec3;
 
 use super::{
-    LoadError, height_conversions,
+    LoadError,
+    far_models::{self, Copy},
+    height_conversions,
     motion::{carrier, model_motion},
     objects::{ModelObjects, ObjectList, name_or},
     placements::{Placement, read_placements},
@@ -24,6 +26,7 @@ use crate::{
     gltf_file::{GltfOptions, MAX_RADIUS_M, read_moving_gltf},
     pictures::read_texture,
     terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
+    wording::joined_notes,
 };
 
 /// Reads all files that `[scene]` names. Returns the scene, the summary of the terrain, and notes.
@@ -63,7 +66,10 @@ pub(super) fn load_scene(
         let picture_error = |source| LoadError::Picture { key: "scene.pattern.image", source };
         let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(picture_error)?;
         let object = objects.add(name_or(&pattern.name, "pattern"), pattern.class);
-        let mesh = Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m);
+        let mesh = match pattern.repeat {
+            false => Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m),
+            true => Mesh::repeated_picture(Arc::new(texture), local(pattern.at), pattern.width_m),
+        };
         scene.meshes.push(Mesh { object, ..mesh });
     }
     if let Some(spec) = &spec.board {
@@ -79,9 +85,11 @@ pub(super) fn load_scene(
                 .to_owned(),
         );
     }
+    let mut of_models = Vec::new();
     for spec in &spec.gltf {
-        notes.extend(add_model(scenario, log, spec, &mut scene, &mut objects)?);
+        of_models.push((spec.file.as_path(), add_model(scenario, log, spec, &mut scene, &mut objects)?));
     }
+    notes.extend(joined_notes(of_models.iter().map(|(file, notes)| (*file, &notes[..]))));
     scene.objects = objects.into_objects();
     notes.extend(blended_triangles_note(&scene));
     let remaining = split_intersecting_blended(&mut scene.meshes).remaining;
@@ -127,10 +135,8 @@ fn add_model(
         normals: scenario.scene.light.is_some(),
     };
     let model = read_moving_gltf(&spec.file, options, &model_motion(spec))?;
-    let notes_of = |left_out: Option<String>| -> Vec<String> {
-        let notes = model.notes.iter().cloned().chain(left_out);
-        notes.map(|note| format!("{}: {note}", spec.file.display())).collect()
-    };
+    let notes_of =
+        |others: Vec<String>| -> Vec<String> { model.notes.iter().cloned().chain(others).collect() };
     let model_objects = ModelObjects::new(spec, &model)?;
     if let Some(carrier) = carrier(scenario, log, spec, scene.terrain.as_ref())? {
         let position_ned_m = carrier.start().position_m;
@@ -139,13 +145,13 @@ fn add_model(
         let placed = model.place_on(Some(&carrier), position_ned_m, heading_rad, spec.scale);
         let numbers = model_objects.of_copy(1, objects);
         scene.meshes.extend(placed.zip(numbers).map(|(mesh, object)| Mesh { object, ..mesh }));
-        return Ok(notes_of(None));
+        return Ok(notes_of(Vec::new()));
     }
     let placements = match &spec.placements {
         None => vec![Placement { position: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
         Some(path) => read_placements(path, spec.on_ground)?,
     };
-    let (all, mut without_ground) = (placements.len(), 0);
+    let (all, mut without_ground, mut copies) = (placements.len(), 0, Vec::new());
     for (row, Placement { position: (local, geodetic), heading_deg, scale }) in (1..).zip(placements) {
         let mut position_ned_m = position_ned_m(scenario, log, local, geodetic, "a place of scene.gltf")?;
         if spec.on_ground {
@@ -172,11 +178,14 @@ fn add_model(
         let placed =
             model.place(position_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale);
         let numbers = model_objects.of_copy(row, objects);
+        let first = scene.meshes.len();
         scene.meshes.extend(placed.zip(numbers).map(|(mesh, object)| Mesh { object, ..mesh }));
+        copies.push(Copy::new(position_ned_m, &scene.meshes[first..]));
     }
+    let far = far_models::notes(scenario, log, spec, &copies, model.spacing_m());
     let left_out = (without_ground > 0)
         .then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
-    Ok(notes_of(left_out))
+    Ok(notes_of(left_out.into_iter().chain(far).collect()))
 }
 
 /// Refuses a model that is farther away than [`MAX_RADIUS_M`].

@@ -14,7 +14,10 @@ const MOST_TURNS: f64 = 1.05;
 
 /// Warns of a unit that is probably wrong, and of keys that have no effect or clip the picture.
 pub(super) fn unlikely_values(camera: &CameraSpec) -> Vec<String> {
-    [field_warning(camera), full_well_warning(camera), reset_warning(camera)].into_iter().flatten().collect()
+    [field_warning(camera), noise_warning(camera), full_well_warning(camera), reset_warning(camera)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// A focal length that was given in millimetres, or in pixels of another size.
@@ -50,6 +53,18 @@ fn field_warning(camera: &CameraSpec) -> Option<String> {
             camera.focal_px[1],
             // Three digits.
             if across_deg < 1.0 { format!("{across_deg:.2e}") } else { format!("{across_deg:.0}") }
+        )
+    })
+}
+
+/// Noise of more than the range from black to white, as where 8-bit values were meant.
+fn noise_warning(camera: &CameraSpec) -> Option<String> {
+    let sigma = camera.photometric.noise_sigma;
+    (sigma > 1.0).then(|| {
+        format!(
+            "camera.photometric.noise_sigma = {sigma} is {sigma} times white, of which little is left: white is 1; divide \
+             8-bit values by 255, which makes {:.4}",
+            sigma / 255.0
         )
     })
 }
@@ -113,6 +128,18 @@ mod tests {
         ] {
             assert_eq!(field(model, focal_px), "", "{model:?} {focal_px}");
         }
+    }
+
+    #[test]
+    fn noise_of_8_bit_values_is_said() {
+        let camera = |noise_sigma| {
+            let mut camera = CameraSpec::default();
+            camera.photometric.noise_sigma = noise_sigma;
+            camera
+        };
+        let text = noise_warning(&camera(30.0)).unwrap_or_default();
+        assert!(text.contains("noise_sigma = 30") && text.contains("makes 0.1176"), "{text}");
+        assert_eq!(noise_warning(&camera(1.0)), None);
     }
 
     #[test]

@@ -142,7 +142,7 @@ fn manifests_are_scenarios_that_repeat_the_run() {
     // A key that is set beside a path does not move the path.
     let sets = [("scene.terrain.ortho_white".to_owned(), "2047".to_owned())];
     let terrain = read_scenario(&run, &sets, None).unwrap().scene.terrain.unwrap();
-    assert_eq!(terrain.ortho, Some(dir.path().join("out/../there/ortho.tif")));
+    assert_eq!(terrain.ortho, Some(dir.path().join("out/../there/ortho.tif").into()));
     for (text, wanted) in [
         ("{ \"apply\": {} }", "run.json: JSON without `scenario`"),
         ("{ \"scenario\": ", "run.json: neither TOML nor JSON"),
@@ -213,7 +213,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
     let mut tree = serde_json::to_value(&scenario).unwrap();
     let mut visited = Vec::new();
     for_each_path(&mut tree, &mut |key, _| visited.push(key.replace(".0.", ".").replace(".1.", ".")));
-    for (key, _) in keys().iter().filter(|(_, kind)| *kind == ValueKind::Path) {
+    for (key, _) in keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::Path | ValueKind::Paths)) {
         assert!(visited.iter().any(|visited| visited == key), "{key}");
     }
     assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");

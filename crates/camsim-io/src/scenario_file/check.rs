@@ -4,6 +4,7 @@ use camsim_core::lens::foreign_model;
 use toml::{Table, Value};
 
 use super::{
+    escapes,
     schema::{self, Schema, ValueKind},
     similar,
     tree::{Tree, join},
@@ -51,16 +52,23 @@ fn check_table(
                 }
                 None
             }
-            (Some(ValueKind::Path), Value::String(path)) => {
-                *path = tree.resolve(&indexed_key, path).to_string_lossy().into_owned();
+            (Some(ValueKind::Path | ValueKind::Paths), Value::String(path)) => {
+                resolve(tree, &indexed_key, path)
+            }
+            (Some(ValueKind::Paths), Value::Array(paths))
+                if !paths.is_empty() && paths.iter().all(Value::is_str) =>
+            {
+                for (index, element) in paths.iter_mut().enumerate() {
+                    if let Value::String(path) = element {
+                        let element_key = join(&indexed_key, &index.to_string());
+                        let message = resolve(tree, &element_key, path);
+                        problems.extend(message.map(|message| (element_key, message)));
+                    }
+                }
                 None
             }
             (Some(kind @ ValueKind::WordsOrTables(words)), value) => {
-                let problem = type_problem(&key, kind, value);
-                if problem.is_none() {
-                    resolve_tables(tree, words, value, &indexed_key);
-                }
-                problem
+                type_problem(&key, kind, value).or_else(|| resolve_tables(tree, words, value, &indexed_key))
             }
             (Some(kind), value) => type_problem(&key, kind, value),
             (None, Value::Table(table)) if schema.is_table(&key) => {
@@ -89,16 +97,27 @@ fn check_table(
     }
 }
 
-/// Resolves the paths of a value that is a word, the path of a table, or a list of these.
-fn resolve_tables(tree: &Tree, words: &[&str], value: &mut Value, indexed_key: &str) {
+/// Resolves a path. Returns what is wrong with it.
+fn resolve(tree: &Tree, indexed_key: &str, path: &mut String) -> Option<String> {
+    if path.is_empty() {
+        return Some("the path is empty; name a file, or remove the key".into());
+    }
+    let resolved = tree.resolve(indexed_key, path);
+    let problem = escapes::path_problem(path, &resolved);
+    *path = resolved.to_string_lossy().into_owned();
+    problem
+}
+
+/// Resolves the paths of a value that is a word, the path of a table, or a list of these. Returns what is wrong
+/// with the first that cannot be meant.
+fn resolve_tables(tree: &Tree, words: &[&str], value: &mut Value, indexed_key: &str) -> Option<String> {
     match value {
-        Value::String(text) if !words.contains(&text.as_str()) => {
-            *text = tree.resolve(indexed_key, text).to_string_lossy().into_owned();
-        }
-        Value::Array(array) => array.iter_mut().enumerate().for_each(|(i, element)| {
-            resolve_tables(tree, words, element, &join(indexed_key, &i.to_string()));
+        Value::String(text) if !words.contains(&text.as_str()) => resolve(tree, indexed_key, text),
+        Value::Array(array) => array.iter_mut().enumerate().fold(None, |problem, (i, element)| {
+            let own = resolve_tables(tree, words, element, &join(indexed_key, &i.to_string()));
+            problem.or(own)
         }),
-        _ => {}
+        _ => None,
     }
 }
 
@@ -169,6 +188,7 @@ fn type_problem(key: &str, kind: ValueKind, value: &Value) -> Option<String> {
             format!("a list of lists of {n} numbers"),
         ),
         ValueKind::Path => (false, "a path in quotes".to_owned()),
+        ValueKind::Paths => (false, "a path in quotes or a list of these".to_owned()),
         ValueKind::Text => (value.is_str(), "a text in quotes".to_owned()),
         ValueKind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),
         ValueKind::Tables => (false, format!("a list of tables; write [[{key}]]")),

@@ -63,6 +63,8 @@ pub enum ValueKind {
     Points(usize),
     /// A path, resolved against the folder of the file that names it.
     Path,
+    /// A path, or a list of paths.
+    Paths,
     /// One of these words.
     Word(&'static [&'static str]),
     /// Any text.
@@ -301,11 +303,11 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("camera.photometric.vignetting.polynomial", NumberList),
     ("camera.photometric.vignetting.polynomial_red", NumberList),
     ("camera.photometric.vignetting.polynomial_blue", NumberList),
-    ("scene.terrain.dem", Path),
-    ("scene.terrain.ortho", Path),
+    ("scene.terrain.dem", Paths),
+    ("scene.terrain.ortho", Paths),
     ("scene.terrain.height", Word(HEIGHT)),
     ("scene.terrain.epsg", Within(0, u16::MAX as u32)),
-    ("scene.terrain.height_unit", Word(&["m", "ft", "us-ft"])),
+    ("scene.terrain.height_unit", Word(&["m", "ft", "us-ft", "dm", "cm", "mm"])),
     ("scene.terrain.ortho_white", Number),
     ("scene.terrain.beyond", Word(&["grey", "edge", "void"])),
     ("scene.terrain.name", Text),
@@ -315,6 +317,7 @@ pub(super) const KEYS: &[(&str, ValueKind)] = &[
     ("scene.pattern.at", NumbersOr(3, "origin")),
     ("scene.pattern.name", Text),
     ("scene.pattern.class", CLASS),
+    ("scene.pattern.repeat", Flag),
     ("scene.board.target", Path),
     ("scene.board.kind", Word(&["chessboard", "circles", "asymmetric-circles", "aprilgrid", "charuco"])),
     ("scene.board.columns", Within(1, 80)),
@@ -534,7 +537,7 @@ impl ValueKind {
     #[must_use]
     pub fn is_path(self, text: &str) -> bool {
         match self {
-            Path => true,
+            Path | Paths => true,
             WordsOrTables(words) => !words.contains(&text),
             _ => false,
         }

@@ -188,7 +188,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
     let terrain = scenario.scene.terrain.as_mut().unwrap();
     (terrain.name, terrain.class) = (Some("ground".into()), Some(2));
     let pattern = scenario.scene.pattern.as_mut().unwrap();
-    (pattern.name, pattern.class) = (Some("marks".into()), Some(3));
+    (pattern.name, pattern.class, pattern.repeat) = (Some("marks".into()), Some(3), true);
     let model = &mut scenario.scene.gltf[0];
     (model.name, model.class, model.objects) = (Some("house".into()), Some(7), ObjectsOf::Node);
     model.classes = [("roof".to_owned(), 8)].into();

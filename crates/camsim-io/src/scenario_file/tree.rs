@@ -13,6 +13,7 @@ use toml::{
 
 use super::{
     ScenarioError,
+    escapes::{backslash_advice, with_slashes},
     schema::{CAMERAS, KEYS},
     wrong_file_kind::wrong_kind_message,
 };
@@ -167,9 +168,9 @@ impl Tree {
     pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
         match self.location(key) {
             KeyLocation::File(file, _) | KeyLocation::Run(file, true) => {
-                file.parent().unwrap_or(Path::new("")).join(path)
+                with_slashes(file.parent().unwrap_or(Path::new("")).join(path))
             }
-            KeyLocation::Set(_) | KeyLocation::Run(_, false) => path.into(),
+            KeyLocation::Set(_) | KeyLocation::Run(_, false) => with_slashes(path.into()),
         }
     }
 
@@ -183,6 +184,9 @@ impl Tree {
         let key = self.numbered(key).map_err(fail)?;
         if text == UNSET {
             return self.unset(&key, fail);
+        }
+        if let Some(advice) = unparsed_backslashes(text) {
+            return Err(fail(advice));
         }
         self.put(&key, value(text), &KeyLocation::Set(shown.clone()), fail)
     }
@@ -306,8 +310,19 @@ fn from_json(json: &serde_json::Value) -> Option<Value> {
 
 /// Parses a TOML value; any other text becomes a string, so that words need no quotes.
 pub(super) fn value(text: &str) -> Value {
+    parsed_value(text).unwrap_or_else(|| Value::String(text.into()))
+}
+
+/// The TOML value of a text, if it is one.
+fn parsed_value(text: &str) -> Option<Value> {
     let parsed = toml::from_str::<Table>(&format!("v = {text}")).ok().filter(|table| table.len() == 1);
-    parsed.and_then(|mut table| table.remove("v")).unwrap_or_else(|| Value::String(text.into()))
+    parsed.and_then(|mut table| table.remove("v"))
+}
+
+/// Advice for a text in quotes, or a list of these, that is no TOML because of its backslashes.
+fn unparsed_backslashes(text: &str) -> Option<String> {
+    let is_quoted = text.trim_start().starts_with(['"', '[']);
+    backslash_advice(text).filter(|_| is_quoted && parsed_value(text).is_none())
 }
 
 /// A value as messages show it.
@@ -356,6 +371,9 @@ fn syntax_hint(path: &Path, line: &str) -> String {
             "; if it is another program's calibration, convert it: `camsim camera import {path} -o CAMERA.toml`, of \
              several cameras with --rig"
         );
+    }
+    if let Some(advice) = backslash_advice(line) {
+        return format!("; {advice}");
     }
     let parts: Vec<&str> = line.split('#').next().unwrap_or_default().split(',').collect();
     let is_decimal = |pair: &[&str]| {

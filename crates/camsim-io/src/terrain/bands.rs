@@ -1,6 +1,6 @@
 //! Assignment of a picture's bands to colours and alpha.
 
-use super::{metadata::BandMeaning, tiff_file::Image};
+use super::{citations::excerpt, metadata::BandMeaning, tiff_file::Image};
 
 /// Values of tag 262 (PhotometricInterpretation) with their treatment.
 pub(crate) const PHOTOMETRICS: &[(u64, &str, &str)] = &[
@@ -37,7 +37,96 @@ pub(super) struct ColorBands {
 /// Whether a band that the tags declare as alpha may be alpha: some writers declare any fourth band so and
 /// state otherwise in GDAL_METADATA.
 pub(super) fn may_be_alpha(meaning: Option<&BandMeaning>) -> bool {
-    meaning.and_then(|band| band.color.as_ref()).is_none_or(|color| color.eq_ignore_ascii_case("Alpha"))
+    let Some(band) = meaning else { return true };
+    let is_of_color = band.color.as_ref().is_none_or(|color| color.eq_ignore_ascii_case("Alpha"));
+    let words = |text: &String| described_words(text);
+    is_of_color
+        && band.description.as_ref().map(words).is_none_or(|words| !words.iter().any(|word| is_light(word)))
+}
+
+/// Words of bands that are light, visible or not.
+fn is_light(word: &str) -> bool {
+    matches!(
+        word,
+        "red"
+            | "green"
+            | "blue"
+            | "nir"
+            | "ir"
+            | "infrared"
+            | "nearinfrared"
+            | "near"
+            | "rededge"
+            | "edge"
+            | "swir"
+            | "yellow"
+            | "coastal"
+            | "thermal"
+            | "pan"
+    )
+}
+
+/// Lower-case words of a description.
+fn described_words(text: &str) -> Vec<String> {
+    text.to_lowercase()
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The colour (0 red, 1 green, 2 blue) that a description names and nothing else: `Blue`, `B`, `Band 1: Blue`,
+/// `sr_blue`, `Red (650 nm)`, but not `Red edge`, `Coastal blue` or `B2`.
+fn described_color(text: &str) -> Option<usize> {
+    let is_neutral = |word: &str| {
+        let digits = word.trim_start_matches("band").trim_start_matches("channel").trim_start_matches("ch");
+        let digits = digits.trim_start_matches('b').trim_end_matches("nm");
+        matches!(
+            word,
+            "band"
+                | "channel"
+                | "ch"
+                | "layer"
+                | "colour"
+                | "color"
+                | "sr"
+                | "toa"
+                | "boa"
+                | "surface"
+                | "reflectance"
+                | "nm"
+                | "um"
+                | "light"
+        ) || digits.chars().all(|c| c.is_ascii_digit()) && word != "b"
+    };
+    let words = described_words(text);
+    let mut named = words.iter().filter(|word| !is_neutral(word));
+    let color = match named.next()?.as_str() {
+        "red" | "r" => 0,
+        "green" | "g" => 1,
+        "blue" | "b" => 2,
+        _ => return None,
+    };
+    named.next().is_none().then_some(color)
+}
+
+/// Bands of red, green and blue by their descriptions; `None` where one of them is missing or named twice.
+fn described_rgb(image: &Image, meanings: &[BandMeaning]) -> Option<[usize; 3]> {
+    let mut rgb = [None; 3];
+    for (index, band) in meanings.iter().take(image.bands).enumerate() {
+        let Some(color) = band.description.as_deref().and_then(described_color) else { continue };
+        if rgb[color].replace(index).is_some() {
+            return None;
+        }
+    }
+    Some([rgb[0]?, rgb[1]?, rgb[2]?])
+}
+
+/// The descriptions of a picture's bands for a message, if it has any.
+fn quoted_descriptions(image: &Image, meanings: &[BandMeaning]) -> Option<String> {
+    let bands = meanings.iter().take(image.bands).map(|band| band.description.as_deref().unwrap_or("-"));
+    let texts: Vec<String> = bands.map(excerpt).collect();
+    texts.iter().any(|text| text != "-").then(|| texts.join(", "))
 }
 
 impl ColorBands {
@@ -55,20 +144,56 @@ impl ColorBands {
             let kinds = image.extra.iter().enumerate().filter(|(_, extra)| **extra == kind);
             kinds.filter_map(|(k, _)| band(k)).find(|band| may_be_alpha(meanings.get(*band)))
         };
-        let alpha = band_named("Alpha").or_else(|| extra(UNASSOCIATED)).or_else(|| extra(ASSOCIATED));
+        let described_alpha = || {
+            meanings.iter().take(image.bands).position(|band| {
+                band.description
+                    .as_deref()
+                    .is_some_and(|text| described_words(text).contains(&"alpha".to_owned()))
+            })
+        };
+        let alpha = band_named("Alpha")
+            .or_else(|| extra(UNASSOCIATED))
+            .or_else(|| extra(ASSOCIATED))
+            .or_else(described_alpha);
         let is_premultiplied = alpha.is_some() && alpha == extra(ASSOCIATED);
+        let described = described_rgb(image, meanings);
+        let listed = quoted_descriptions(image, meanings).unwrap_or_default();
         let rgb = match [band_named("Red"), band_named("Green"), band_named("Blue")] {
-            [Some(red), Some(green), Some(blue)] => [red, green, blue],
+            [Some(red), Some(green), Some(blue)] => {
+                let interpreted = [red, green, blue];
+                if described.is_some_and(|described| described != interpreted) {
+                    notes.push(format!(
+                        "its bands are described as {listed}, but their colour interpretation has red, green and blue \
+                         in bands {}, which is used: correct one of them",
+                        interpreted.map(|band| (band + 1).to_string()).join(", ")
+                    ));
+                }
+                interpreted
+            }
+            _ if described.is_some() && image.photometric <= 2 => {
+                let rgb = described.unwrap_or([0, 1, 2]);
+                if rgb != [0, 1, 2] {
+                    notes.push(format!(
+                        "its bands are described as {listed}: red, green and blue are taken from bands {}",
+                        rgb.map(|band| (band + 1).to_string()).join(", ")
+                    ));
+                }
+                rgb
+            }
             _ => match image.photometric {
                 0 | 1 | 3 | 4 if image.bands < 3 || image.photometric == 3 => [0; 3],
                 2 if image.bands >= 3 => [0, 1, 2],
                 0 | 1 if image.bands - usize::from(alpha.is_some()) >= 3 => {
-                    notes.push(
-                        "does not state which of its bands are red, green and blue: the first three are \
+                    let described = if listed.is_empty() {
+                        String::new()
+                    } else {
+                        format!(" (they are described as {listed})")
+                    };
+                    notes.push(format!(
+                        "does not state which of its bands are red, green and blue{described}: the first three are \
                          used; to choose, run `gdal_translate -b RED -b GREEN -b BLUE -co PHOTOMETRIC=RGB IN \
                          OUT`"
-                            .to_owned(),
-                    );
+                    ));
                     [0, 1, 2]
                 }
                 0 | 1 => [0; 3],
@@ -106,5 +231,36 @@ impl ColorBands {
             is_inverted: image.photometric == 0,
             notes,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn descriptions_name_one_colour_or_none() {
+        for (text, color) in [
+            ("Blue", Some(2)),
+            ("RED", Some(0)),
+            ("g", Some(1)),
+            ("B", Some(2)),
+            ("Band 1: Blue", Some(2)),
+            ("band1_blue", Some(2)),
+            ("sr_red", Some(0)),
+            ("Green (560 nm)", Some(1)),
+            ("B4 Red", Some(0)),
+            ("Red edge", None),
+            ("RedEdge", None),
+            ("Coastal blue", None),
+            ("NIR", None),
+            ("B04", None),
+            ("red/green", None),
+            ("", None),
+        ] {
+            assert_eq!(described_color(text), color, "{text}");
+        }
+        let band = |text: &str| BandMeaning { description: Some(text.to_owned()), ..BandMeaning::default() };
+        assert!(!may_be_alpha(Some(&band("NIR"))) && may_be_alpha(Some(&band("Alpha"))));
     }
 }

@@ -1,29 +1,20 @@
-//! A digital elevation model: heights stay in the file's type and are converted to metres on access.
+//! A digital elevation model: the heights of one file, or of several tiles of one grid.
 
-use std::{
-    f64::consts::PI,
-    path::{Path, PathBuf},
-};
+use std::{f64::consts::PI, path::PathBuf};
 
 use rayon::prelude::*;
 
-use camsim_core::scenario::{HeightReference, TerrainSpec};
+use camsim_core::scenario::TerrainSpec;
 
 use super::{
     TerrainFileError,
-    bands::may_be_alpha,
-    crs::{Crs, compound},
-    descriptions,
-    geo_tags::GeoTags,
-    georeference::{self, Affine, world_file},
-    height_files,
-    raster::Raster,
-    sidecar,
-    stated_crs::StatedCrs,
-    tiff_file::SampleType,
-    units::{SAME_UNIT_M, metres_per_unit_code, metres_per_unit_name},
-    vertical_crs::{StatedVerticalCrs, VerticalDatum},
+    crs::Crs,
+    files,
+    georeference::Affine,
+    grid_tiles::{self, TileIndex},
+    tile::Tile,
 };
+use crate::wording::joined_notes;
 
 /// Range of plausible heights, metres: from below the deepest sea to above the highest mountain. Others are
 /// undeclared no-data values.
@@ -33,32 +24,23 @@ const PLAUSIBLE_HEIGHTS_M: [f64; 2] = [-11_500.0, 9_500.0];
 const MEAN_RADIUS_M: f64 = 6_371_000.0;
 
 /// Range of common heights, metres; others are reported.
-const USUAL_HEIGHTS_M: [f64; 2] = [-500.0, 9_000.0];
+pub(super) const USUAL_HEIGHTS_M: [f64; 2] = [-500.0, 9_000.0];
 
-/// Relative difference at which a value equals the no-data value, for programs that interpolate it. No-data
-/// values that may be heights are compared exactly.
-const NODATA_TOLERANCE: f64 = 1e-5;
+/// Implausible heights below this may have another unit, of which the millimetre is the smallest; undeclared no-data
+/// values are larger.
+const MAX_OTHER_UNIT: f64 = 9.5e6;
 
-/// Implausible heights below this may have another unit; undeclared no-data values are larger.
-const MAX_OTHER_UNIT: f64 = 1e6;
-
-/// The most common no-data value of files that do not declare one.
-const COMMON_NODATA: f64 = -9999.0;
+/// Tiles whose heights differ by more at a post that they share are reported, metres.
+const SAME_HEIGHT_M: f64 = 0.01;
 
 /// A georeferenced grid of heights (posts); row 0 is the northernmost, column 0 the westernmost.
 pub(super) struct Dem {
+    /// The file, or its tiles in words.
     pub path: PathBuf,
     pub size: [u32; 2],
-    /// Stored values: a sixth of the memory of points in f64.
-    raster: Raster,
-    /// Whether the second band is alpha.
-    has_alpha: bool,
-    /// Whether the file counts columns from the east, rows from the south.
-    is_reversed: [bool; 2],
-    /// Scale and offset from stored values to metres.
-    metres_from_stored: [f64; 2],
-    /// No-data values, as stored.
-    nodata: [f64; 2],
+    /// Tiles from the north, in the same order whatever the order of the list.
+    tiles: Vec<Tile>,
+    index: TileIndex,
     /// Model coordinates from pixel coordinates (corner convention).
     pub model_from_pixel: Affine,
     pub crs: Crs,
@@ -74,6 +56,8 @@ pub(super) struct HeightStatistics {
     pub voids: u64,
     /// Number of voids whose values may be heights in another unit.
     pub implausible: u64,
+    /// Lowest and highest of these.
+    pub implausible_range_m: [f64; 2],
     /// Number of heights outside of the common range.
     pub unlikely: u64,
 }
@@ -86,102 +70,100 @@ pub(super) fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
     [low.min(value), high.max(value)]
 }
 
+/// The range of two ranges, which may be empty.
+pub(super) fn union(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+fn is_plausible(height_m: f64) -> bool {
+    (PLAUSIBLE_HEIGHTS_M[0]..=PLAUSIBLE_HEIGHTS_M[1]).contains(&height_m)
+}
+
 impl Dem {
     /// Reads `scene.terrain.dem`. `uses_geoid` is whether heights are converted by the geoid.
     pub fn read(spec: &TerrainSpec, uses_geoid: bool) -> Result<Self, TerrainFileError> {
-        let path = spec.dem.as_path();
-        let mut raster = height_files::read(path)?;
-        sidecar::read_sidecar_tags(path, &mut raster.geo)?;
-        sidecar::read_sidecar_mask(path, &mut raster).map_err(TerrainFileError::dem)?;
-        let geo = &raster.geo;
-        let (model_from_pixel, mut notes) = read_georeference(path, geo.model_from_pixel)?;
-        let stated = StatedCrs::read(path, geo)?;
-        // A missing georeference is reported before a missing coordinate system.
-        let model_from_pixel = model_from_pixel.ok_or_else(|| no_georeference(path, geo))?;
-        let crs = stated.crs(path, geo, spec.epsg)?;
-        if raster.bands() > 2 {
-            return Err(TerrainFileError::NotHeights { path: path.into(), bands: raster.bands() });
+        let paths = files::dem_files(&spec.dem)?;
+        let mut tiles = Vec::new();
+        for path in &paths {
+            tiles.push(Tile::read(path, spec, uses_geoid)?);
         }
-        notes.extend(geo.notes.iter().cloned());
-        let key_vertical = spec.epsg.and_then(compound).map(|[_, vertical]| vertical);
-        if let Some(problem) = &stated.problem {
-            return Err(TerrainFileError::Meaning { path: path.into(), problem: problem.clone() });
-        }
-        notes.extend(stated.conflict_note.clone());
-        let own_vertical = stated
-            .vertical
-            .or(key_vertical)
-            .map(|code| StatedVerticalCrs::from_code(code, &geo.keys.vertical_citation));
-        let verticals: Vec<&StatedVerticalCrs> =
-            own_vertical.iter().chain(&stated.sidecar_verticals).collect();
-        notes.extend(verticals.iter().find_map(|vertical| vertical.note(spec.height, uses_geoid)));
-        if verticals.is_empty()
-            && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955)
-            && spec.height == HeightReference::Msl
-        {
-            let ellipsoidal = StatedVerticalCrs {
-                code: Some(crs.epsg),
-                datum: Some(VerticalDatum::Ellipsoid),
-                name: crs.name.clone(),
-                metres_per_unit: Some(1.0),
-            };
-            notes.extend(ellipsoidal.note(spec.height, uses_geoid));
-        }
-        notes.extend(crs.accuracy_m.filter(|metres| *metres >= 2.0).map(|metres| {
-            format!(
-                "EPSG:{} ({}) is transformed to WGS-84 with an accuracy of {metres} m: log and terrain may \
-                 be offset by as much",
-                crs.epsg, crs.name
-            )
-        }));
-        let has_alpha = raster.bands() == 2
-            && raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2))
-            && may_be_alpha(geo.bands.get(1));
-        if raster.bands() == 2 && !has_alpha {
-            notes.push("has a second band, which is ignored".to_owned());
-        }
-        if let Some(orientation) = geo.orientation {
-            notes.push(format!(
-                "its orientation (tag 274: {orientation}) is ignored: the georeference defines rows and \
-                 columns"
-            ));
-        }
-        let unit_m = unit_m(spec, geo, &verticals, &stated.height_units, &crs, &mut notes)?;
-        let [scale, offset] = scale_and_offset(path, geo, own_vertical.is_some(), &mut notes)?;
-        notes.extend(descriptions::notes(geo, unit_m, [scale, offset], spec.height_unit.is_some()));
-        // Without a declared no-data value the common ones apply.
-        let lowest = if raster.image.sample == SampleType::I16 { f64::from(i16::MIN) } else { COMMON_NODATA };
-        let nodata = geo.nodata.map_or([COMMON_NODATA, lowest], |nodata| [nodata; 2]);
-        let notes = notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
-        let metres_from_stored = [unit_m * scale, unit_m * offset];
+        grid_tiles::check_alike(&tiles)?;
+        let joined =
+            grid_tiles::join(tiles.iter().map(|tile| {
+                grid_tiles::Placed::new(&tile.path, tile.size, tile.model_from_pixel, &tile.crs)
+            }))?;
+        let path = files::label(&paths);
+        let mut in_order: Vec<Option<Tile>> = tiles.into_iter().map(Some).collect();
+        let tiles: Vec<Tile> = joined.order.iter().filter_map(|&at| in_order.get_mut(at)?.take()).collect();
+        let notes = joined_notes(tiles.iter().map(|tile| (tile.path.as_path(), &tile.notes[..])));
+        let crs = tiles.first().and_then(|tile| Crs::new(tile.crs.epsg));
+        let crs = crs.ok_or_else(|| TerrainFileError::NoCrs { path: path.clone() })?;
         let mut dem = Self {
-            path: path.into(),
-            size: raster.size,
-            raster,
-            has_alpha,
-            is_reversed: [false; 2],
-            metres_from_stored,
-            nodata,
-            model_from_pixel,
+            path,
+            size: joined.size,
+            index: TileIndex::new(&joined.offsets, tiles.iter().map(|tile| tile.size)),
+            tiles,
+            model_from_pixel: joined.model_from_pixel,
             crs,
             notes,
         };
-        dem.orient_north_up();
+        dem.notes.extend(dem.mosaic_notes());
         Ok(dem)
     }
 
-    /// Reverses rows that run from the south and columns that run from the east: the diagonals of cells are
-    /// defined with north up.
-    fn orient_north_up(&mut self) {
-        let [cols, rows] = self.size.map(f64::from);
-        if self.model_from_pixel.row[1] > 0.0 {
-            self.is_reversed[1] = true;
-            self.model_from_pixel = self.model_from_pixel.with_rows_reversed(rows);
+    /// Metres per unit of the heights.
+    pub fn unit_m(&self) -> f64 {
+        self.tiles.first().map_or(1.0, |tile| tile.unit_m)
+    }
+
+    /// Paths of its files.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.tiles.iter().map(|tile| tile.path.clone()).collect()
+    }
+
+    /// What is to be said about tiles: posts that none of them has, and heights that differ where they overlap.
+    fn mosaic_notes(&self) -> Vec<String> {
+        if self.tiles.len() < 2 {
+            return Vec::new();
         }
-        if self.model_from_pixel.column[0] < 0.0 {
-            self.is_reversed[0] = true;
-            self.model_from_pixel = self.model_from_pixel.with_columns_reversed(cols);
-        }
+        let rows = (0..self.size[1]).into_par_iter().map(|row| {
+            (0..self.size[0]).fold((0_u64, 0_u64, 0.0_f64), |(holes, others, most_m), column| {
+                let mut heights =
+                    self.tiles_at([column, row]).map(|height_m| height_m.filter(|h| is_plausible(*h)));
+                match heights.next() {
+                    None => (holes + 1, others, most_m),
+                    Some(first) => {
+                        let range = heights.chain([first]).flatten().fold(EMPTY_RANGE, widened);
+                        let by_m = (range[1] - range[0]).max(0.0);
+                        (holes, others + u64::from(by_m > SAME_HEIGHT_M), most_m.max(by_m))
+                    }
+                }
+            })
+        });
+        let (holes, others, most_m) =
+            rows.reduce(|| (0, 0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1, a.2.max(b.2)));
+        let path = self.path.display();
+        let holes = (holes > 0).then(|| {
+            format!(
+                "{path}: its tiles leave holes: {:.2} % of the rectangle around them has no heights",
+                100.0 * holes as f64 / self.post_count() as f64
+            )
+        });
+        let others = (others > 0).then(|| {
+            format!(
+                "{path}: its tiles differ by up to {most_m:.2} m at {others} of the posts that they share: there the \
+                 heights of the more northern tile are used, or of the more western one"
+            )
+        });
+        holes.into_iter().chain(others).collect()
+    }
+
+    /// Heights of all tiles at a post, metres; `None` for those that are missing.
+    fn tiles_at(&self, post: [u32; 2]) -> impl Iterator<Item = Option<f64>> {
+        self.index.at(post).map(|(tile, post)| {
+            let height_m = self.tiles.get(tile).map_or(f64::NAN, |tile| tile.stored_m(post));
+            (!height_m.is_nan()).then_some(height_m)
+        })
     }
 
     /// Number of posts.
@@ -198,32 +180,31 @@ impl Dem {
     /// Height, metres; NaN for a void.
     pub fn height_m(&self, post: [u32; 2]) -> f64 {
         let height_m = self.stored_m(post);
-        let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
-        if (lowest..=highest).contains(&height_m) { height_m } else { f64::NAN }
+        if is_plausible(height_m) { height_m } else { f64::NAN }
     }
 
-    /// Height, metres, plausible or not; NaN for no-data values and masked posts.
+    /// Height, metres, plausible or not; NaN for no-data values and masked posts. Where tiles overlap, that of the
+    /// first tile with a plausible one.
     fn stored_m(&self, post: [u32; 2]) -> f64 {
-        let [column, row] = [0, 1]
-            .map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - post[k] } else { post[k] } as usize);
-        let pixel = row * self.size[0] as usize + column;
-        let stored = self.raster.value(pixel);
-        let is_nodata = self.nodata.iter().any(|nodata| equals_nodata(stored, *nodata));
-        let is_transparent = self.has_alpha && self.raster.image.value(pixel, 1) == 0.0;
-        if is_nodata || is_transparent || !self.raster.is_valid(pixel) {
-            f64::NAN
-        } else {
-            stored * self.metres_from_stored[0] + self.metres_from_stored[1]
+        if let [only] = &self.tiles[..] {
+            return only.stored_m(post);
         }
+        let known = || self.tiles_at(post).flatten();
+        known().find(|height_m| is_plausible(*height_m)).or_else(|| known().next()).unwrap_or(f64::NAN)
     }
 
     /// Statistics of all heights.
     pub fn statistics(&self) -> HeightStatistics {
-        let none = || HeightStatistics { range_m: EMPTY_RANGE, voids: 0, implausible: 0, unlikely: 0 };
-        let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
+        let none = || HeightStatistics {
+            range_m: EMPTY_RANGE,
+            voids: 0,
+            implausible: 0,
+            implausible_range_m: EMPTY_RANGE,
+            unlikely: 0,
+        };
         let rows = (0..self.size[1]).into_par_iter().map(|row| {
             (0..self.size[0]).fold(none(), |sum, column| match self.stored_m([column, row]) {
-                height_m if (lowest..=highest).contains(&height_m) => {
+                height_m if is_plausible(height_m) => {
                     let is_usual = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&height_m);
                     HeightStatistics {
                         range_m: widened(sum.range_m, height_m),
@@ -231,17 +212,20 @@ impl Dem {
                         ..sum
                     }
                 }
-                height_m => HeightStatistics {
+                height_m if height_m.abs() < MAX_OTHER_UNIT => HeightStatistics {
                     voids: sum.voids + 1,
-                    implausible: sum.implausible + u64::from(height_m.abs() < MAX_OTHER_UNIT),
+                    implausible: sum.implausible + 1,
+                    implausible_range_m: widened(sum.implausible_range_m, height_m),
                     ..sum
                 },
+                _ => HeightStatistics { voids: sum.voids + 1, ..sum },
             })
         });
         rows.reduce(none, |a, b| HeightStatistics {
-            range_m: widened(widened(a.range_m, b.range_m[0]), b.range_m[1]),
+            range_m: union(a.range_m, b.range_m),
             voids: a.voids + b.voids,
             implausible: a.implausible + b.implausible,
+            implausible_range_m: union(a.implausible_range_m, b.implausible_range_m),
             unlikely: a.unlikely + b.unlikely,
         })
     }
@@ -297,198 +281,5 @@ impl Dem {
         (0..cols)
             .flat_map(move |i| [[i, 0], [i, rows - 1]])
             .chain((0..rows).flat_map(move |j| [[0, j], [cols - 1, j]]))
-    }
-}
-
-/// Whether a stored value is the no-data value.
-fn equals_nodata(stored: f64, nodata: f64) -> bool {
-    let may_be_height = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&nodata);
-    // A float32 file may declare its no-data value with more digits.
-    stored == nodata
-        || stored as f32 == nodata as f32
-        || !may_be_height && (stored - nodata).abs() <= NODATA_TOLERANCE * nodata.abs()
-}
-
-/// Metres per unit of the heights. Where the file states several units or may have one of two, the key
-/// decides.
-// Long because: one list of stated units is filled from five sources and then compared.
-fn unit_m(
-    spec: &TerrainSpec,
-    geo: &GeoTags,
-    verticals: &[&StatedVerticalCrs],
-    by_name: &[(String, String)],
-    crs: &Crs,
-    notes: &mut Vec<String>,
-) -> Result<f64, TerrainFileError> {
-    let path = &spec.dem;
-    let meaning = |problem: String| TerrainFileError::Meaning { path: path.clone(), problem };
-    let key_unit_m = spec.height_unit.map(|unit| unit.metres());
-    let mut stated: Vec<(String, f64)> = Vec::new();
-    if let Some(name) = geo.bands.first().and_then(|band| band.unit.as_ref()) {
-        match metres_per_unit_name(name) {
-            Some(unit) => stated.push((format!("unit `{name}`"), unit)),
-            None if key_unit_m.is_none() => {
-                return Err(meaning(format!(
-                    "states `{name}` as the unit of its heights, which is unknown: set \
-                     scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\""
-                )));
-            }
-            None => {}
-        }
-    }
-    for (name, from) in by_name {
-        match metres_per_unit_name(name) {
-            // ARC/INFO has one name for both feet.
-            Some(unit) if key_unit_m.is_some_and(|key| (key - unit).abs() < 1e-6) => {}
-            Some(unit) => stated.push((format!("{from} {name}"), unit)),
-            None if key_unit_m.is_none() => {
-                return Err(meaning(format!(
-                    "{from} is `{name}`, which is an unknown unit: set scene.terrain.height_unit = \"m\", \
-                     \"ft\" or \"us-ft\""
-                )));
-            }
-            None => {}
-        }
-    }
-    for vertical in verticals {
-        let Some(unit) = &vertical.metres_per_unit else { continue };
-        let label = vertical
-            .code
-            .map_or_else(|| vertical.name.clone(), |code| format!("EPSG:{code} ({})", vertical.name));
-        if *unit < 0.0 {
-            return Err(meaning(format!(
-                "states depths ({}), positive downwards: negate them with `gdal_calc.py -A IN --calc=-A \
-                 --outfile OUT`",
-                vertical.label()
-            )));
-        }
-        stated.push((label, *unit));
-    }
-    if let Some(code) = geo.keys.vertical_unit {
-        match metres_per_unit_code(code) {
-            Some(unit) => stated.push((format!("VerticalUnits {code}"), unit)),
-            None if key_unit_m.is_none() => {
-                return Err(TerrainFileError::Unit { path: path.clone(), kind: "vertical", code });
-            }
-            None => {}
-        }
-    }
-    let tag_count = stated.len();
-    stated.extend(
-        descriptions::units(geo).filter_map(|(name, value)| {
-            Some((format!("item {name} `{value}`"), metres_per_unit_name(value)?))
-        }),
-    );
-    if let (0, None, Some((text, unit))) =
-        (tag_count, key_unit_m, stated.first().filter(|(_, unit)| *unit != 1.0))
-    {
-        notes.push(format!(
-            "its heights are read in units of {unit} m, from its {text}: if that is not the unit of heights, \
-             remove it and set scene.terrain.height_unit"
-        ));
-    }
-    let is_same = |a: f64, b: f64| (a - b).abs() < SAME_UNIT_M;
-    let agree = stated.windows(2).all(|pair| is_same(pair[0].1, pair[1].1));
-    let listed =
-        || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
-    match (key_unit_m, stated.first()) {
-        (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| is_same(*stated, unit)) => {
-            Err(meaning(format!(
-                "states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file",
-                listed()
-            )))
-        }
-        (Some(unit), _) => Ok(unit),
-        (None, Some(_)) if !agree => Err(meaning(format!(
-            "states {}: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
-            listed()
-        ))),
-        (None, Some((_, unit))) => Ok(*unit),
-        // Files with coordinates in feet may have heights in feet or metres.
-        (None, None) if crs.metres_per_unit().is_some_and(|unit| !is_same(unit, 1.0)) => {
-            Err(meaning(format!(
-                "EPSG:{} ({}) has coordinates in feet, and the unit of the heights is not stated: set \
-                 scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
-                crs.epsg, crs.name
-            )))
-        }
-        (None, None) => Ok(1.0),
-    }
-}
-
-/// Scale and offset from stored values to heights in their unit: `scale x stored + offset`.
-fn scale_and_offset(
-    path: &Path,
-    geo: &GeoTags,
-    has_vertical: bool,
-    notes: &mut Vec<String>,
-) -> Result<[f64; 2], TerrainFileError> {
-    let meaning = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
-    let band = geo
-        .bands
-        .first()
-        .map(|band| (band.scale, band.offset))
-        .filter(|(scale, offset)| scale.is_some() || offset.is_some());
-    let band_scale = band.map(|(scale, offset)| [scale.unwrap_or(1.0), offset.unwrap_or(0.0)]);
-    if band_scale.is_some_and(|[scale, _]| scale == 0.0) {
-        return Err(meaning("states a scale of 0 for its heights (GDAL_METADATA): correct the file".into()));
-    }
-    match (band_scale, geo.vertical_scale) {
-        (Some(band), Some(tags)) if has_vertical && band != tags => Err(meaning(format!(
-            "states two scales of its heights, {band:?} (GDAL_METADATA) and {tags:?} (ModelPixelScale and \
-             ModelTiepoint): remove one with `gdal_translate`"
-        ))),
-        // As in GDAL, the georeference scales heights only with a vertical system; without one, writers leave
-        // arbitrary values there.
-        (None, Some(tags)) if has_vertical => Ok(tags),
-        (band_scale, Some([scale, offset])) if !has_vertical => {
-            notes.push(format!(
-                "the third values of ModelPixelScale and ModelTiepoint (scale {scale}, offset {offset}) are \
-                 not applied: the file states no vertical system"
-            ));
-            Ok(band_scale.unwrap_or([1.0, 0.0]))
-        }
-        (band_scale, _) => Ok(band_scale.unwrap_or([1.0, 0.0])),
-    }
-}
-
-/// The georeference of the file's tags or of a world file, with notes.
-pub(super) fn read_georeference(
-    path: &Path,
-    from_tags: Option<Affine>,
-) -> Result<(Option<Affine>, Vec<String>), TerrainFileError> {
-    let (affine, notes) = match from_tags {
-        Some(affine) => {
-            // A world file that cannot be read is ignored, because it is not needed.
-            let other = world_file(path).ok().flatten().filter(|other| !is_same_georeference(&affine, other));
-            (Some(affine), other.map(|_| "a world file differs from its tags and is ignored".to_owned()))
-        }
-        None => (world_file(path)?, None),
-    };
-    match affine {
-        Some(affine) if affine.inverse().is_none() => {
-            Err(TerrainFileError::DegenerateGeoreference { path: path.into() })
-        }
-        affine => Ok((affine, notes.into_iter().collect())),
-    }
-}
-
-/// Whether two georeferences agree to a hundredth of a pixel at the corner and a millionth in size.
-fn is_same_georeference(a: &Affine, b: &Affine) -> bool {
-    let Some(pixel_from_model) = a.inverse() else { return true };
-    let is_near = |pixel: [f64; 2]| {
-        let other_pixel = pixel_from_model.apply(b.apply(pixel));
-        (0..2).all(|k| (other_pixel[k] - pixel[k]).abs() < 0.01 + 1e-6 * pixel[k])
-    };
-    is_near([0.0, 0.0]) && is_near([1000.0, 1000.0])
-}
-
-fn no_georeference(path: &Path, geo: &GeoTags) -> TerrainFileError {
-    let world = georeference::world_file_names(path).into_iter().next().unwrap_or_default();
-    let world = world.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    TerrainFileError::NoGeoreference {
-        path: path.into(),
-        world,
-        details: geo.notes.iter().map(|note| format!(" ({note})")).collect(),
     }
 }

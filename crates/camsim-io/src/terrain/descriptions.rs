@@ -1,6 +1,10 @@
 //! Free-text metadata about heights, outside of the tags with a defined meaning: units, scales, depths.
 
-use super::{geo_tags::GeoTags, units::metres_per_unit_name};
+use super::{
+    citations::{excerpt, vertical_parts},
+    geo_tags::GeoTags,
+    units::metres_per_unit_name,
+};
 
 /// Names of items that state the unit of heights, without separators.
 const UNIT_KEYS: [&str; 9] = [
@@ -67,9 +71,9 @@ pub(super) fn notes(
         normalized_key(name)
             .is_some_and(|key| matches!(key.as_str(), "longname" | "standardname" | "description"))
     });
-    let vertical = Some(&geo.keys.vertical_citation).filter(|text| !text.is_empty());
-    for text in geo.descriptions.iter().chain(item_texts.map(|(_, value)| value)).chain(vertical) {
-        let excerpt: String = text.trim_end_matches('\0').trim().chars().take(80).collect();
+    let texts = geo.descriptions.iter().chain(item_texts.map(|(_, value)| value)).map(String::as_str);
+    for text in texts.chain(vertical_parts(&geo.keys).map(|part| part.text)) {
+        let excerpt = excerpt(text);
         if !has_unit_key && (unit_m - 1.0).abs() < 1e-9 && mentions_feet(text) {
             notes.push(format!(
                 "is described as `{excerpt}`, but its heights are read as metres: if they are in feet, set \

@@ -67,13 +67,21 @@ const TAGS: &[(&str, &str, &str)] = &[
 /// Keys of scene.terrain with their effect.
 const KEYS: &[(&str, &str)] = &[
     (
+        "dem, ortho",
+        "a file, or several that are tiles of one grid: a list of paths, a folder, or a path with `*` and `?` (of folders \
+         and patterns those that end in tif, tiff, hgt, asc, and for ortho also png, jpg, jpeg, webp). Tiles need one \
+         coordinate system, pixel size and grid (to 0.02 pixels), and heights of one unit and datum; else the command \
+         that joins them is given. They may overlap: the more northern, then the more western tile counts, and \
+         differences above 1 cm are reported. Holes between them have no heights (no colour), which is reported",
+    ),
+    (
         "height",
         "`\"ellipsoid\"` or `\"msl\"`: the datum of the heights. A vertical system of the file that \
          contradicts it is reported",
     ),
     (
         "height_unit",
-        "`\"m\"`, `\"ft\"`, `\"us-ft\"`: needed where the file states two units or an unknown one, or has \
+        "`\"m\"`, `\"ft\"`, `\"us-ft\"`, `\"dm\"`, `\"cm\"`, `\"mm\"`: needed where the file states two units or an unknown one, or has \
          coordinates in feet and no unit of heights",
     ),
     ("epsg", "the coordinate system of a DEM that states none"),

@@ -46,6 +46,8 @@ pub(crate) struct GeoKeys {
     pub method: Option<u16>,
     /// Keys 3073, 1026 or 2049: name of the system.
     pub citation: String,
+    /// All of these keys that are given, by their names.
+    pub citations: Vec<(&'static str, String)>,
     /// Key 3076: EPSG code of the linear unit.
     pub linear_unit: Option<u16>,
     /// Key 2054: EPSG code of the angular unit.
@@ -62,7 +64,12 @@ pub(crate) struct GeoKeys {
 pub(crate) const GEO_KEYS: &[(&str, &str, &str)] = &[
     ("1024 GTModelType", "projected or geographic", "applied; geocentric is refused"),
     ("1025 GTRasterType", "whether integer pixel coordinates are corners (1) or centres (2)", "applied"),
-    ("1026, 3073 citations", "name of the coordinate system", "stated where the system is refused"),
+    (
+        "1026, 2049, 3073 citations",
+        "name of the coordinate system",
+        "stated where the system is refused. Its vertical part (after a plus, or by words such as NAVD88 or height) \
+         as 4097; another unit of coordinates than that of the code is reported",
+    ),
     ("2048 GeodeticCRS", "EPSG code of latitude and longitude", "applied, or refused by its code"),
     ("2054 GeogAngularUnits", "9102 (degrees)", "applied; others are refused"),
     ("3072 ProjectedCRS", "EPSG code of east and north", "applied, or refused by its code"),
@@ -78,7 +85,12 @@ pub(crate) const GEO_KEYS: &[(&str, &str, &str)] = &[
         "EPSG code of the heights' datum and unit",
         "unit applied; a datum that contradicts scene.terrain.height is reported",
     ),
-    ("4097 VerticalCitation", "name of the vertical system", "stated where 4096 is unknown"),
+    (
+        "4097 VerticalCitation",
+        "name of the vertical system",
+        "stated where 4096 is unknown; its unit is applied and reported where nothing else states one, its datum is \
+         reported where it contradicts scene.terrain.height",
+    ),
     ("4099 VerticalUnits", "9001 metre, 9002 foot, 9003 US survey foot", "applied; others are refused"),
 ];
 
@@ -183,6 +195,10 @@ impl GeoTags {
             projection: key(3074),
             method: key(3075),
             citation: text(3073).or_else(|| text(1026)).or_else(|| text(2049)).unwrap_or_default(),
+            citations: [("GTCitation", 1026), ("GeogCitation", 2049), ("PCSCitation", 3073)]
+                .into_iter()
+                .filter_map(|(name, number)| Some((name, text(number)?)))
+                .collect(),
             linear_unit: key(3076),
             angular_unit: key(2054),
             vertical: key(4096),

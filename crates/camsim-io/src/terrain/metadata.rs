@@ -12,6 +12,8 @@ pub(crate) struct BandMeaning {
     pub unit: Option<String>,
     /// Colour interpretation: "Red", "Green", "Blue", "Alpha", "Gray", "Palette" and others.
     pub color: Option<String>,
+    /// What it is, in words.
+    pub description: Option<String>,
     /// No-data value; only in `.aux.xml`.
     pub nodata: Option<f64>,
 }
@@ -41,6 +43,11 @@ pub(crate) const ITEMS: &[(&str, &str)] = &[
         "applied to heights: metre, foot, US survey foot, and cm, mm, km; others are refused",
     ),
     ("`COLORINTERP` of a band (`<ColorInterp>`)", "applied: bands of red, green, blue, grey, alpha"),
+    (
+        "`DESCRIPTION` of a picture's bands (`<Description>`)",
+        "applied where it names red, green and blue (`Blue`, `B`, `Band 1: Blue`, `sr_blue`), or alpha, and \
+         `COLORINTERP` does not; reported where the order is another than red, green, blue, or the colours are not known by them",
+    ),
     ("`<NoDataValue>`", "applied, before the scale"),
     ("`<GeoTransform>`, `<SRS>`", "applied where the raster itself has none"),
     (
@@ -85,7 +92,13 @@ impl Metadata {
                     metadata.band(sample)?.unit = Some(text.to_owned()).filter(|text| !text.is_empty())
                 }
                 "colorinterp" => metadata.band(sample)?.color = Some(text.to_owned()),
-                "description" if sample == 0 => metadata.descriptions.push(text.to_owned()),
+                "description" => {
+                    metadata.band(sample)?.description =
+                        Some(text.to_owned()).filter(|text| !text.is_empty());
+                    if sample == 0 {
+                        metadata.descriptions.push(text.to_owned());
+                    }
+                }
                 "" if sample == 0 => metadata
                     .items
                     .push((item.attribute("name").unwrap_or_default().to_owned(), text.to_owned())),
@@ -141,6 +154,7 @@ impl Metadata {
                 nodata,
                 unit: child_text(band, "UnitType").filter(|text| !text.is_empty()),
                 color: child_text(band, "ColorInterp"),
+                description: child_text(band, "Description").filter(|text| !text.is_empty()),
             };
         }
         Ok(metadata)

@@ -1,27 +1,35 @@
 //! The ortho-image on the terrain.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    scenario::{Beyond, TerrainSpec},
+    scenario::{Beyond, FileList, TerrainSpec},
     scene::{Encoding, Texture, linear_from_srgb, srgb_from_linear},
 };
 
 use super::{
     TerrainFileError,
     crs::Crs,
-    dem::{Dem, read_georeference},
-    geo_tags::GeoTags,
+    dem::Dem,
+    files,
+    geo_tags::{GeoKeys, GeoTags},
     georeference::Affine,
+    grid_tiles,
     raster::{Raster, is_tiff},
     sidecar,
     stated_crs::StatedCrs,
     tiff_file::gdal_translate,
+    tile::read_georeference,
 };
-use crate::pictures::{PictureError, StoredPicture, read_stored};
+use crate::{
+    pictures::{PictureError, StoredPicture, read_stored},
+    wording::joined_notes,
+};
 
 /// An ortho-image.
 pub(super) struct Ortho {
+    /// The file, or its tiles in words.
+    pub path: PathBuf,
     pub texture: Texture,
     /// `None` for an image that covers the DEM's extent.
     pub georeference: Option<OrthoGeoreference>,
@@ -83,10 +91,22 @@ impl OrthoGeoreference {
 
 impl Ortho {
     /// Reads `scene.terrain.ortho`.
-    pub fn read(path: &Path, spec: &TerrainSpec, dem: &Dem) -> Result<Self, TerrainFileError> {
-        let (mut texture, geo, mut notes) = read_image(path, spec)?;
-        let (model_from_pixel, georeference_notes) = read_georeference(path, geo.model_from_pixel)?;
-        notes.extend(georeference_notes);
+    pub fn read(files: &FileList, spec: &TerrainSpec, dem: &Dem) -> Result<Self, TerrainFileError> {
+        let paths = files::ortho_files(files)?;
+        match &paths[..] {
+            [path] => Self::of_picture(path.clone(), Picture::read(path, spec)?, spec, dem),
+            paths => Self::of_picture(files::label(paths), joined(paths, spec, dem)?, spec, dem),
+        }
+    }
+
+    fn of_picture(
+        path: PathBuf,
+        picture: Picture,
+        spec: &TerrainSpec,
+        dem: &Dem,
+    ) -> Result<Self, TerrainFileError> {
+        let Picture { mut texture, geo, model_from_pixel, mut notes } = picture;
+        let path = path.as_path();
         let Some(model_from_pixel) = model_from_pixel else {
             if let Some(orientation) = geo.orientation {
                 texture = crate::pictures::oriented(texture, orientation);
@@ -96,6 +116,7 @@ impl Ortho {
             let valid = valid_pixels(&texture);
             fill_invalid(&mut texture, None, spec.beyond);
             return Ok(Self {
+                path: path.into(),
                 texture,
                 georeference: None,
                 valid,
@@ -110,10 +131,7 @@ impl Ortho {
                  and columns"
             ));
         }
-        let stated = StatedCrs::read(path, &geo)?;
-        // With a world file alone, the coordinate system is the DEM's.
-        let assumed = (stated.horizontal.is_none() && stated.user_defined.is_none()).then_some(dem.crs.epsg);
-        let crs = stated.crs(path, &geo, assumed)?;
+        let crs = picture_crs(path, &geo, dem)?;
         let pixel_from_model = model_from_pixel
             .inverse()
             .ok_or_else(|| TerrainFileError::DegenerateGeoreference { path: path.into() })?;
@@ -137,6 +155,7 @@ impl Ortho {
             georeference.margin_px = f64::from(MARGIN_PX);
         }
         Ok(Self {
+            path: path.into(),
             texture,
             georeference: Some(georeference),
             valid,
@@ -184,6 +203,86 @@ impl Ortho {
         let [x, y] = [0, 1].map(|k: usize| pixel[k].min(size[k] - 1.0) as usize);
         valid[y * size[0] as usize + x]
     }
+}
+
+/// A picture with what its file and sidecar files state.
+struct Picture {
+    texture: Texture,
+    geo: GeoTags,
+    model_from_pixel: Option<Affine>,
+    notes: Vec<String>,
+}
+
+impl Picture {
+    fn read(path: &Path, spec: &TerrainSpec) -> Result<Self, TerrainFileError> {
+        let (texture, geo, mut notes) = read_image(path, spec)?;
+        let (model_from_pixel, georeference_notes) = read_georeference(path, geo.model_from_pixel)?;
+        notes.extend(georeference_notes);
+        Ok(Self { texture, geo, model_from_pixel, notes })
+    }
+}
+
+/// The coordinate system of a picture. With a world file alone it is the DEM's.
+fn picture_crs(path: &Path, geo: &GeoTags, dem: &Dem) -> Result<Crs, TerrainFileError> {
+    let stated = StatedCrs::read(path, geo)?;
+    let assumed = (stated.horizontal.is_none() && stated.user_defined.is_none()).then_some(dem.crs.epsg);
+    stated.crs(path, geo, assumed)
+}
+
+/// Several pictures as tiles of one. Holes between them are transparent. Where they overlap, the first from the
+/// north with colour counts.
+fn joined(paths: &[PathBuf], spec: &TerrainSpec, dem: &Dem) -> Result<Picture, TerrainFileError> {
+    let mut pictures = Vec::new();
+    for path in paths {
+        let mut picture = Picture::read(path, spec)?;
+        let Some(model_from_pixel) = &mut picture.model_from_pixel else {
+            return Err(TerrainFileError::Meaning {
+                path: path.clone(),
+                problem: "has no georeference, which a tile of an ortho-image needs: give it a world file"
+                    .into(),
+            });
+        };
+        // Tiles have rows from the north, as the joined picture.
+        if model_from_pixel.row[1] > 0.0 {
+            *model_from_pixel = model_from_pixel.with_rows_reversed(f64::from(picture.texture.size_px[1]));
+            reverse_rows(&mut picture.texture);
+        }
+        let crs = picture_crs(path, &picture.geo, dem)?;
+        pictures.push((path, crs, picture));
+    }
+    let grid = grid_tiles::join(pictures.iter().map(|(path, crs, picture)| {
+        let affine = picture.model_from_pixel.unwrap_or(dem.model_from_pixel);
+        grid_tiles::Placed::new(path, picture.texture.size_px, affine, crs)
+    }))?;
+    let notes = joined_notes(pictures.iter().map(|(path, _, picture)| (path.as_path(), &picture.notes[..])));
+    let [width, height] = grid.size.map(|side| side as usize);
+    let mut rgba8 = vec![0; 4 * width * height];
+    let mut geo = GeoTags::default();
+    let mut in_order: Vec<_> = pictures.into_iter().map(Some).collect();
+    for (&index, &[x, y]) in grid.order.iter().zip(&grid.offsets) {
+        let Some((_, crs, picture)) = in_order.get_mut(index).and_then(Option::take) else { continue };
+        geo.keys = GeoKeys { projected: Some(crs.epsg), ..GeoKeys::default() };
+        let row_bytes = 4 * picture.texture.size_px[0] as usize;
+        for (row, bytes) in picture.texture.rgba8.chunks_exact(row_bytes).enumerate() {
+            let start = 4 * ((y as usize + row) * width + x as usize);
+            let target = rgba8[start..start + row_bytes].chunks_exact_mut(4);
+            for (pixel, tile) in target.zip(bytes.chunks_exact(4)).filter(|(pixel, _)| pixel[3] == 0) {
+                pixel.copy_from_slice(tile);
+            }
+        }
+    }
+    Ok(Picture {
+        texture: Texture { size_px: grid.size, rgba8, encoding: Encoding::Srgb },
+        geo,
+        model_from_pixel: Some(grid.model_from_pixel),
+        notes,
+    })
+}
+
+fn reverse_rows(texture: &mut Texture) {
+    let row_bytes = 4 * texture.size_px[0] as usize;
+    let rows: Vec<&[u8]> = texture.rgba8.chunks_exact(row_bytes).rev().collect();
+    texture.rgba8 = rows.concat();
 }
 
 /// Says that a picture without georeference has neither the shape of the DEM's ground nor that of its grid.

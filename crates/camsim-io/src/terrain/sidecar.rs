@@ -121,6 +121,7 @@ fn merge(geo: &mut GeoTags, path: &Path, aux: Metadata) -> Result<(), String> {
         merge_value(&mut own.unit, other.unit, "UnitType")?;
         // GDAL guesses it; tags take precedence.
         own.color = own.color.take().or(other.color);
+        own.description = own.description.take().or(other.description);
         // Heights use the first band alone, and pictures have one no-data value for all bands.
         let is_nan = band > 0 || geo.nodata.is_some_and(f64::is_nan) && other.nodata.is_some_and(f64::is_nan);
         if !is_nan {

@@ -151,6 +151,10 @@ fn nodata_and_implausible_values_are_voids() {
     let ned = ned_frame([45.15, 9.0], 0.0);
     let loaded = read_terrain(&spec(&path, None), &ned, None).unwrap();
     assert_eq!((loaded.summary.void_heights, loaded.terrain.void_cells), (4, 4));
+    // A row without heights has no range.
+    heights[..5].fill(f32::NAN);
+    write_dem(&path, [5, 5], &heights, Some(&UTM));
+    assert_eq!(read_terrain(&spec(&path, None), &ned, None).unwrap().summary.height_range_m, [5.0; 2]);
     // With a declared no-data value the common ones do not apply.
     heights.fill(0.0);
     heights[24] = 100.0;

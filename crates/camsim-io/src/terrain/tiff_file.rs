@@ -46,17 +46,19 @@ pub(crate) mod tag {
     pub const RPC_COEFFICIENTS: u16 = 50844;
 }
 
+/// A path as a word of a command.
+pub(crate) fn quoted(path: &std::path::Path) -> String {
+    let text = path.display().to_string();
+    if text.chars().any(|c| c.is_whitespace() || "'\"()&;$".contains(c)) {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    } else {
+        text
+    }
+}
+
 /// The command that converts a file: `gdal_translate OPTIONS IN OUT` with its paths.
 pub(crate) fn gdal_translate(options: &str, path: &std::path::Path) -> String {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let quoted = |path: &std::path::Path| {
-        let text = path.display().to_string();
-        if text.chars().any(|c| c.is_whitespace() || "'\"()&;$".contains(c)) {
-            format!("'{}'", text.replace('\'', "'\\''"))
-        } else {
-            text
-        }
-    };
     format!(
         "gdal_translate {options} {} {}",
         quoted(path),

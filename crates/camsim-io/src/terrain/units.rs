@@ -1,5 +1,8 @@
 //! Units of length by EPSG code and by name.
 
+/// Words of scene.terrain.height_unit, for messages.
+pub(super) const HEIGHT_UNITS: &str = "\"m\", \"ft\", \"us-ft\", \"dm\", \"cm\" or \"mm\"";
+
 /// Units that differ by less are the same; the international and the US survey foot differ by six times as
 /// much.
 pub(super) const SAME_UNIT_M: f64 = 1e-7;

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod heights;
+mod mosaic;
 mod pictures;
 mod raster;
 mod sidecar;

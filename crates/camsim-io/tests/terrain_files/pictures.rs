@@ -13,7 +13,7 @@ const GREY: [u8; 3] = [118; 3];
 
 /// A terrain with an ortho-image made by GDAL.
 fn with_ortho(name: &str) -> TerrainSpec {
-    TerrainSpec { ortho: Some(gdal_file(name)), ..spec(&gdal_file("bigtiff.tif")) }
+    TerrainSpec { ortho: Some(gdal_file(name).into()), ..spec(&gdal_file("bigtiff.tif")) }
 }
 
 /// Asserts that every colour is (40 + 4 column, 30 + 4 row, 100) within a tolerance, or grey.
@@ -86,7 +86,7 @@ fn read_ortho(tiff: Tiff, edit: impl FnOnce(&mut TerrainSpec)) -> Result<([u8; 3
     let [dem, ortho] = ["dem.tif", "ortho.tif"].map(|name| folder.path().join(name));
     Tiff::heights([4, 3], |_, _| 100.0).write(&dem);
     tiff.write(&ortho);
-    let mut spec = TerrainSpec { ortho: Some(ortho), ..spec(&dem) };
+    let mut spec = TerrainSpec { ortho: Some(ortho.into()), ..spec(&dem) };
     edit(&mut spec);
     read(&spec).map(|loaded| (color(&loaded, [1, 1]), loaded.notes)).map_err(|error| error.to_string())
 }
@@ -129,7 +129,7 @@ fn white_level_is_the_full_range_or_ortho_white() {
     image::ImageBuffer::<image::Rgb<u16>, _>::from_pixel(4, 3, image::Rgb([300u16, 2000, 9]))
         .save(&path)
         .unwrap();
-    let spec = TerrainSpec { ortho: Some(path), ..with_ortho("palette.tif") };
+    let spec = TerrainSpec { ortho: Some(path.into()), ..with_ortho("palette.tif") };
     let notes = read(&spec).unwrap().notes;
     assert!(
         notes[0].contains("reach only 2000 of 65535")
@@ -216,7 +216,7 @@ fn exif_orientation_is_applied_without_georeference() {
     // With a georeference the orientation is ignored with a note.
     let dem = folder.path().join("dem.tif");
     Tiff::heights([64, 32], |_, _| 100.0).write(&dem);
-    let spec = TerrainSpec { ortho: Some(path), ..spec(&dem) };
+    let spec = TerrainSpec { ortho: Some(path.into()), ..spec(&dem) };
     write_oriented_jpeg(&folder.path().join("turned.jpg"), 3);
     let loaded = read(&spec).unwrap();
     assert!(!is_red(&loaded.terrain.texture.rgba8[..4]) && loaded.notes.is_empty(), "{:?}", loaded.notes);

@@ -32,8 +32,8 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
     let (scenario, name) = match setup.data {
         Some(data) => {
             let terrain = TerrainSpec {
-                dem: data.join("terrain/sertig/sertig_valley.tif"),
-                ortho: Some(data.join("terrain/sertig/sertig_valley_color.tif")),
+                dem: data.join("terrain/sertig/sertig_valley.tif").into(),
+                ortho: Some(data.join("terrain/sertig/sertig_valley_color.tif").into()),
                 ..TerrainSpec::default()
             };
             let own = test_bench::scenario(camera);

@@ -15,6 +15,7 @@ pub(crate) fn good() -> Scenario {
         at: Default::default(),
         name: None,
         class: None,
+        repeat: false,
     };
     Scenario::new(FlightSpec::new("flight.csv"), SceneSpec { pattern: Some(pattern), ..SceneSpec::default() })
 }

@@ -57,7 +57,9 @@ impl Draw {
         if (matches!(law, Law::Piece(_))) != (matches!(law, Law::Piece(_)) && name == "flight.window_s") {
             return Err("piece_s goes with flight.window_s".into());
         }
-        if kind.is_none_or(|kind| matches!(kind, ValueKind::Tables | ValueKind::Path)) && !is_choice {
+        if kind.is_none_or(|kind| matches!(kind, ValueKind::Tables | ValueKind::Path | ValueKind::Paths))
+            && !is_choice
+        {
             return Err("takes no numbers: write { choice = [...] } with values that it can have".into());
         }
         let targets = targets(name, tree)?;

@@ -50,7 +50,8 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         // Numbers of frames, which are whole.
         ValueKind::NumberList if key.starts_with("camera.timing.") => as_written(ui, key, value, param),
         ValueKind::NumberList => number_list(ui, document, key, value, param, out),
-        ValueKind::Path => path(ui, document, key, value),
+        ValueKind::Paths if value.is_some_and(Value::is_array) => as_written(ui, key, value, param),
+        ValueKind::Path | ValueKind::Paths => path(ui, document, key, value),
         ValueKind::Flag => flag(ui, key, value),
         ValueKind::Word(words) => word(ui, key, value, words).or_else(|| removal(ui, key, value)),
         ValueKind::Words(words) => word_list(ui, key, value, words).or_else(|| removal(ui, key, value)),
