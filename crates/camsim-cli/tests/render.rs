@@ -331,6 +331,46 @@ fn verify_small(more: &[&str]) -> (u8, String, String) {
 }
 
 #[test]
+fn verify_finds_no_fault_in_the_flow_of_any_readout() {
+    let shakes = [
+        "--set",
+        "camera.mount.vibration=[{axis=\"pitch\", amplitude_deg=2.0, hz=60.0}, {axis=\"yaw\", amplitude_deg=2.0, hz=55.0}]",
+        "--set",
+        "camera.focal_px=[400, 400]",
+    ];
+    let cases: [(&str, &str, &[&str]); 9] = [
+        ("top-to-bottom", "0", &[]),
+        ("top-to-bottom", "0", &shakes),
+        ("right-to-left", "0", &shakes),
+        ("middle-outward", "0", &[]),
+        ("middle-outward", "0", &shakes),
+        ("edges-inward", "0", &[]),
+        ("bottom-to-top", "20", &[]),
+        ("left-to-right", "20", &[]),
+        ("top-to-bottom", "20", &shakes),
+    ];
+    for (readout, interlace_ms, more) in cases {
+        let sets = [
+            "output.channels=[\"color\", \"flow\", \"flow_back\", \"flow_global\"]".to_owned(),
+            "output.flow_instant=last-row".to_owned(),
+            "camera.principal_point_px=[47.5, 35.5]".to_owned(),
+            "camera.shutter.delay_ms=5".to_owned(),
+            format!("camera.shutter.readout={readout}"),
+            format!("camera.shutter.interlace_ms={interlace_ms}"),
+        ];
+        let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
+        let common: Vec<&str> = ["--backend", "cpu", "--json"].into_iter().chain(sets).collect();
+        let (_, out, err) = verify_small(&[&common[..], more].concat());
+        let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let flows = report["frames"][0]["flows"].as_array().unwrap();
+        assert_eq!(flows.len(), 3, "{out}{err}");
+        for flow in flows {
+            assert_eq!(flow["faults"], 0, "{readout} {interlace_ms} {more:?}: {flow}");
+        }
+    }
+}
+
+#[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn picture_error_above_tolerance_fails_and_unpredicted_causes_are_named() {
     let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]", "--pictures"];
