@@ -2,7 +2,7 @@
 //! the instants of that picture's rows.
 //!
 //! The equation `place = project(camera(t(place)), point(t(place)))` along the readout is looked at in steps of
-//! one pixel, from border to border. Each change of sign is closed in on by bisection, and each turn near zero by
+//! half a pixel, from border to border. Each change of sign is closed in on by bisection, and each turn near zero by
 //! thirds, as two solutions may be beside it.
 
 use glam::{DVec2, DVec3};
@@ -14,9 +14,12 @@ use crate::{
     scene::RigidMotion,
 };
 
-/// Halvings of an interval of one pixel.
+/// Step along the readout, pixels: the centres of rows, where the speed of the readout may change, are among the
+/// places.
+const STEP_PX: f64 = 0.5;
+/// Halvings of an interval of one step.
 const BISECTIONS: u32 = 36;
-/// Steps towards the turn of a miss: to 1e-5 of two pixels.
+/// Steps towards the turn of a miss: to 1e-5 of two intervals.
 const THIRDS: u32 = 28;
 /// Step of the derivative by differences, seconds.
 const STEP_S: f64 = 1e-4;
@@ -41,7 +44,7 @@ pub(super) struct FlowPicture<'a> {
     fields: Vec<FieldScan>,
 }
 
-/// The readout of one field, in steps of one pixel from border to border.
+/// The readout of one field, in steps from border to border.
 #[derive(Debug)]
 struct FieldScan {
     /// An image row of the field.
@@ -75,11 +78,11 @@ impl Oracle {
             let low_px = (first - 0.5 * step).max(-0.5);
             let high_px = (last + 0.5 * step).min(f64::from(self.timing.lines()) - 0.5);
             let place = |k: u32| {
-                let along_px = (low_px + f64::from(k)).min(high_px);
+                let along_px = (low_px + STEP_PX * f64::from(k)).min(high_px);
                 let t_s = stamp_s + self.timing.dt_along_s(along_px, row);
                 (along_px, t_s, self.sequence.path.pose(t_s))
             };
-            FieldScan { row, places: (0..=(high_px - low_px).ceil() as u32).map(place).collect() }
+            FieldScan { row, places: (0..=((high_px - low_px) / STEP_PX).ceil() as u32).map(place).collect() }
         };
         FlowPicture {
             oracle: self,

@@ -115,7 +115,7 @@ fn sequence_with(north_m: f64, focal_px: [f64; 2], vibration: &[VibrationSpec]) 
 }
 
 /// Mid-exposure of a fractional row of a frame.
-fn row_s(frame: u32, y: f64) -> f64 {
+fn row_s(frame: i32, y: f64) -> f64 {
     f64::from(frame) / FPS + READOUT_S * ((y + 0.5) / f64::from(SIZE_PX[1]) - 0.5)
 }
 
@@ -180,7 +180,7 @@ struct Sight {
 }
 
 /// All instants of a frame's readout, a fortieth of a row apart, with the row and the camera.
-fn instants(frame: u32, oracle: &Oracle) -> Vec<(f64, f64, CameraPose)> {
+fn instants(frame: i32, oracle: &Oracle) -> Vec<(f64, f64, CameraPose)> {
     let rows = (0..=40 * SIZE_PX[1]).map(|k| f64::from(k) / 40.0 - 0.5);
     rows.map(|y| (y, row_s(frame, y), oracle.sequence().path.pose(row_s(frame, y)))).collect()
 }
@@ -241,10 +241,11 @@ fn of_several_places_the_nearest_that_is_seen_counts() {
         hz,
         phase_deg: 20.0,
     });
-    let sequence = sequence_with(-14.0, [400.0; 2], &vibration);
+    let sequence = sequence_with(-20.0, [400.0; 2], &vibration);
     with_pixels(sequence, |pixels, oracle| {
-        let target = pixels.planner.frame_camera(2).unwrap();
-        let instants = instants(2, oracle);
+        // Before, the raft was over what is beside it now.
+        let target = pixels.planner.frame_camera(-2).unwrap();
+        let instants = instants(-2, oracle);
         let (mut states, mut behind_a_hidden_one) = ([0; 5], 0);
         for (i, [dx, dy, state]) in flow(pixels, &target).into_iter().enumerate() {
             let pixel = pixels.pixel(i).unwrap();
@@ -269,7 +270,7 @@ fn of_several_places_the_nearest_that_is_seen_counts() {
                 usize::from(places.first().is_some_and(|first| first.is_hidden) && !seen.is_empty());
         }
         let [_, visible, occluded, outside, several] = states;
-        assert!(visible > 200 && occluded > 10 && outside > 100 && several > 100, "{states:?}");
+        assert!(visible > 200 && occluded > 100 && outside > 50 && several > 200, "{states:?}");
         assert!(behind_a_hidden_one > 10, "{behind_a_hidden_one}");
     });
 }
