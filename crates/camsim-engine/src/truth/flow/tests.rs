@@ -33,11 +33,15 @@ const FPS: f64 = 30.0;
 
 /// A raft that turns while it drifts below a camera in flight, over a picture that stands still.
 fn sequence() -> Arc<Sequence> {
-    sequence_with(-10.0, [50.0, 52.0], &[])
+    sequence_with([-10.0, 0.0], [50.0, 52.0], &[])
 }
 
-/// The camera begins so far north, and vibrates.
-fn sequence_with(north_m: f64, focal_px: [f64; 2], vibration: &[VibrationSpec]) -> Arc<Sequence> {
+/// The camera begins so far north and east, and vibrates.
+fn sequence_with(
+    [north_m, east_m]: [f64; 2],
+    focal_px: [f64; 2],
+    vibration: &[VibrationSpec],
+) -> Arc<Sequence> {
     // Long because: every part of a sequence is written out.
     let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
     let times_s = vec![-1.0, 1.0];
@@ -92,7 +96,7 @@ fn sequence_with(north_m: f64, focal_px: [f64; 2], vibration: &[VibrationSpec]) 
     scenario.camera.shutter =
         ShutterSpec { readout_ms: 1e3 * READOUT_S, exposure_ms: 1e3 * EXPOSURE_S, ..ShutterSpec::default() };
     let first = BodyState {
-        position_ned_m: DVec3::new(north_m, 0.0, -50.0),
+        position_ned_m: DVec3::new(north_m, east_m, -50.0),
         velocity_ned_m_s: DVec3::new(10.0, -2.0, 1.0),
         acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body: DQuat::IDENTITY,
@@ -241,7 +245,7 @@ fn of_several_places_the_nearest_that_is_seen_counts() {
         hz,
         phase_deg: 20.0,
     });
-    let sequence = sequence_with(-20.0, [400.0; 2], &vibration);
+    let sequence = sequence_with([-10.0, -8.0], [400.0; 2], &vibration);
     with_pixels(sequence, |pixels, oracle| {
         // Before, the raft was over what is beside it now.
         let target = pixels.planner.frame_camera(-2).unwrap();
