@@ -331,6 +331,86 @@ fn verify_small(more: &[&str]) -> (u8, String, String) {
 }
 
 #[test]
+fn verify_finds_no_fault_in_the_flow_of_any_readout() {
+    let shakes = [
+        "--set",
+        "camera.mount.vibration=[{axis=\"pitch\", amplitude_deg=2.0, hz=60.0}, {axis=\"yaw\", amplitude_deg=2.0, hz=55.0}]",
+        "--set",
+        "camera.focal_px=[400, 400]",
+    ];
+    let cases: [(&str, &str, &[&str]); 9] = [
+        ("top-to-bottom", "0", &[]),
+        ("top-to-bottom", "0", &shakes),
+        ("right-to-left", "0", &shakes),
+        ("middle-outward", "0", &[]),
+        ("middle-outward", "0", &shakes),
+        ("edges-inward", "0", &[]),
+        ("bottom-to-top", "20", &[]),
+        ("left-to-right", "20", &[]),
+        ("top-to-bottom", "20", &shakes),
+    ];
+    for (readout, interlace_ms, more) in cases {
+        let sets = [
+            "output.channels=[\"color\", \"flow\", \"flow_back\", \"flow_global\"]".to_owned(),
+            "output.flow_instant=last-row".to_owned(),
+            "camera.principal_point_px=[47.5, 35.5]".to_owned(),
+            "camera.shutter.delay_ms=5".to_owned(),
+            format!("camera.shutter.readout={readout}"),
+            format!("camera.shutter.interlace_ms={interlace_ms}"),
+        ];
+        let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
+        let common: Vec<&str> = ["--backend", "cpu", "--json"].into_iter().chain(sets).collect();
+        let (_, out, err) = verify_small(&[&common[..], more].concat());
+        let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let flows = report["frames"][0]["flows"].as_array().unwrap();
+        assert_eq!(flows.len(), 3, "{out}{err}");
+        for flow in flows {
+            assert_eq!(flow["faults"], 0, "{readout} {interlace_ms} {more:?}: {flow}");
+        }
+    }
+}
+
+/// A fast flight half a metre above the ground: within a readout the camera passes what its last rows see.
+const LOW_FLIGHT: &str = r#"
+seed = 5
+[flight]
+log = "log.csv"
+format = "csv-ned"
+[camera]
+size_px = [40, 30]
+focal_px = [30.0, 29.55]
+fps = 20.0
+[camera.mount]
+angles_deg = [2.0, -2.0, 3.0]
+[camera.shutter]
+readout_ms = 30.0
+readout = "bottom-to-top"
+exposure_ms = 10.0
+[scene]
+pattern = { image = "acircles.png", width_m = 600.0, at = [0.0, 0.0, 0.0] }
+[output]
+channels = ["color", "range"]
+"#;
+
+#[test]
+fn what_no_ideal_frame_holds_is_seen_by_rays() {
+    let temporary = tempfile::tempdir().unwrap();
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
+    fs::copy(assets.join("acircles.png"), temporary.path().join("acircles.png")).unwrap();
+    let log = "t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg\n0,0,0,-0.5,0,0,0\n2,50,2,-0.5,0,0,20\n";
+    fs::write(temporary.path().join("log.csv"), log).unwrap();
+    let scenario = temporary.path().join("low.toml");
+    fs::write(&scenario, LOW_FLIGHT).unwrap();
+    let args =
+        ["verify", scenario.to_str().unwrap(), "--backend", "cpu", "--frames", "5", "--json", "--pictures"];
+    let (_, out, err) = camsim(&args);
+    let report: serde_json::Value = serde_json::from_str(&out).expect(&err);
+    let frame = &report["frames"][0];
+    assert!(frame["measured"]["missing"] == 0 && frame["planes"][0]["faults"] == 0, "{frame}");
+    assert!(frame["picture"]["psnr_db"].as_f64().unwrap() > 35.0, "{frame}");
+}
+
+#[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn picture_error_above_tolerance_fails_and_unpredicted_causes_are_named() {
     let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]", "--pictures"];

@@ -10,8 +10,8 @@
 //! from the left; the two reverse readout directions count from the other end. Interlaced fields always
 //! consist of image rows, for any readout direction.
 //!
-//! **Split readout**: both halves of the rows are read at once, `dt = -delay + s (|2 row + 1 - N|/N - 0.5) t_r`
-//! with s = 1 from the middle outward and -1 from the edges inward; the middle of the readout has `-delay`.
+//! **Split readout**: both halves of the rows are read at once, `dt = -delay + s (|2 row + 1 - N| - 1)/N t_r`
+//! with s = 1 from the middle outward and -1 from the edges inward; both middle rows have `-delay`.
 //!
 //! **Global reset**: all exposures begin at once and end at the readout of their rows. Their lengths are
 //! `t_e + (share - first share) t_r`, where the share of a row is the factor of `t_r` above, and mid-exposures
@@ -134,19 +134,15 @@ impl Shutter {
         self.dt_readout_s(line) - self.field_lag_s(y)
     }
 
-    /// Instant of the readout, relative to the stamp, seconds: mid-exposure of the outer row or column that is
-    /// read first or last, or the middle between both, which is `-delay` without interlacing.
+    /// Instant of a frame, relative to the stamp, seconds: that of the image's centre, which is `-delay` in any
+    /// readout (the earlier one of two fields has a lag), or the mid-exposure of the row or column of either field
+    /// that is exposed first or last.
     pub fn dt_instant_s(&self, instant: FlowInstant) -> f64 {
-        let last = self.lines() - 1;
-        let outer_s = self.outer_lines().map(|line| self.dt_row_s(line));
+        let mids = self.outer_exposures().map(|(mid_s, _)| mid_s);
         match instant {
-            FlowInstant::FirstRow => outer_s.fold(f64::INFINITY, f64::min),
-            // The readout is symmetric about the delay; a mean of both ends would add rounding.
-            FlowInstant::Centre => match self.row_axis() {
-                RowAxis::Rows => -self.delay_s - 0.5 * (self.field_lag_s(0) + self.field_lag_s(last)),
-                RowAxis::Columns => -self.delay_s,
-            },
-            FlowInstant::LastRow => outer_s.fold(f64::NEG_INFINITY, f64::max),
+            FlowInstant::FirstRow => mids.fold(f64::INFINITY, f64::min),
+            FlowInstant::Centre => -self.delay_s,
+            FlowInstant::LastRow => mids.fold(f64::NEG_INFINITY, f64::max),
         }
     }
 
@@ -158,22 +154,28 @@ impl Shutter {
 
     /// Earliest begin and latest end of the exposure of any pixel, relative to the stamp.
     pub fn window_s(&self) -> (f64, f64) {
+        self.outer_exposures()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(begin_s, end_s), (mid_s, half_s)| {
+                (begin_s.min(mid_s - half_s), end_s.max(mid_s + half_s))
+            })
+    }
+
+    /// Mid-exposure, relative to the stamp, and half of the exposure of pixels among which are those that are
+    /// exposed first and last, seconds.
+    fn outer_exposures(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
         let last = self.lines() - 1;
         // An image of one row has only one field; others have both. Among image rows, the earliest and latest
         // of each field are among the outer two.
-        let rows = self.size_px[1];
+        let second_row = 1.min(self.size_px[1] - 1);
+        let shutter = *self;
         let lines = self.outer_lines().chain([1.min(last), last.saturating_sub(1)]);
-        let exposures = lines.flat_map(|line| {
-            let ys = match self.row_axis() {
+        lines.flat_map(move |line| {
+            let ys = match shutter.row_axis() {
                 RowAxis::Rows => [line, line],
-                RowAxis::Columns => [0, 1.min(rows - 1)],
+                RowAxis::Columns => [0, second_row],
             };
-            let half_s = 0.5 * self.exposure_row_s(line);
-            ys.map(|y| self.dt_readout_s(line) - self.field_lag_s(y))
-                .map(|dt_s| [dt_s - half_s, dt_s + half_s])
-        });
-        exposures.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), [begin_s, end_s]| {
-            (min.min(begin_s), max.max(end_s))
+            let half_s = 0.5 * shutter.exposure_row_s(line);
+            ys.map(|y| (shutter.dt_readout_s(line) - shutter.field_lag_s(y), half_s))
         })
     }
 
@@ -207,7 +209,7 @@ impl Shutter {
         self.outer_lines().map(|line| self.exposure_row_s(line)).fold(self.exposure_s, f64::max)
     }
 
-    /// Exposure time of a row in the middle of the readout, seconds.
+    /// Exposure time of the image's centre, seconds.
     pub fn centre_exposure_s(&self) -> f64 {
         match self.reset {
             Reset::Rolling => self.exposure_s,
@@ -233,16 +235,20 @@ impl Shutter {
         matches!(self.direction, Readout::MiddleOutward | Readout::EdgesInward)
     }
 
-    /// Where among the rows of the readout the middle of its time is: between two rows, with the share of the
-    /// way from the first to the second.
+    /// Rows or columns of the readout between which the image's centre is, or, of an interlaced image, rows of the
+    /// later field, with the share of the way from the first to the second.
     pub fn centre_lines(&self) -> (u32, u32, f64) {
         let last = self.lines() - 1;
-        if !self.is_split() {
-            return (last / 2, last.div_ceil(2), 0.5);
-        }
-        let along = (0.25 * f64::from(self.lines()) - 0.5).max(0.0);
-        let first = along as u32;
-        (first, (first + 1).min(last), along - f64::from(first))
+        let has_fields = self.row_axis() == RowAxis::Rows && self.interlace_s > 0.0 && last > 0;
+        let (start, step) = match (has_fields, self.first_field) {
+            (true, Parity::Even) => (1, 2),
+            (true, Parity::Odd) => (0, 2),
+            (false, _) => (0, 1),
+        };
+        let along = ((0.5 * f64::from(last) - f64::from(start)) / f64::from(step)).max(0.0);
+        let first = start + step * along as u32;
+        let second = if first + step > last { first } else { first + step };
+        (first, second, along.fract())
     }
 
     /// Age of the image centre at its stamp (-t_d), seconds.
@@ -290,12 +296,12 @@ impl Shutter {
         self.share(line) * readout_s - self.delay_s
     }
 
-    /// Share of the readout time after its middle at which a row is read, -0.5 to 0.5.
+    /// Share of the readout time at which a row is read after the image's centre.
     fn share(&self, line: u32) -> f64 {
         let lines = self.lines();
         let position = || (f64::from(line) + 0.5) / f64::from(lines) - 0.5;
         // Rows as far above the middle as others below it have the same time to the last bit.
-        let from_middle = || f64::from((2 * line + 1).abs_diff(lines)) / f64::from(lines) - 0.5;
+        let from_middle = || f64::from((2 * line + 1).abs_diff(lines).saturating_sub(1)) / f64::from(lines);
         match self.direction {
             Readout::TopToBottom | Readout::LeftToRight => position(),
             Readout::BottomToTop | Readout::RightToLeft => -position(),
@@ -319,6 +325,15 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+
+    const READOUTS: [Readout; 6] = [
+        Readout::TopToBottom,
+        Readout::BottomToTop,
+        Readout::LeftToRight,
+        Readout::RightToLeft,
+        Readout::MiddleOutward,
+        Readout::EdgesInward,
+    ];
 
     fn spec() -> ShutterSpec {
         ShutterSpec { delay_ms: 5.0, readout_ms: 33.0, exposure_ms: 8.0, ..ShutterSpec::default() }
@@ -393,22 +408,23 @@ mod tests {
     }
 
     #[test]
-    fn instants_are_those_of_the_outer_rows_and_of_their_middle() {
-        for readout in
-            [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft]
-        {
-            for interlace_ms in [0.0, 20.0] {
+    fn instants_are_those_of_the_first_and_last_exposed_pixel_and_of_the_image_centre() {
+        for readout in READOUTS {
+            let is_split = matches!(readout, Readout::MiddleOutward | Readout::EdgesInward);
+            for interlace_ms in [0.0, 2.0, 20.0] {
+                if is_split && interlace_ms > 0.0 {
+                    continue;
+                }
                 let spec = ShutterSpec { readout, interlace_ms: FieldOr::Ms(interlace_ms), ..spec() };
                 let shutter = Shutter::from_spec(&spec, 30.0, [6, 4]).unwrap();
                 let [first_s, centre_s, last_s] =
                     [FlowInstant::FirstRow, FlowInstant::Centre, FlowInstant::LastRow]
                         .map(|instant| shutter.dt_instant_s(instant));
-                let times: Vec<f64> = (0..shutter.lines()).map(|line| shutter.dt_row_s(line)).collect();
-                let last = times.len() - 1;
-                assert_eq!(first_s, times[0].min(times[last]));
-                assert_eq!(last_s, times[0].max(times[last]));
-                assert!((centre_s - 0.5 * (times[0] + times[last])).abs() < 1e-15);
-                assert!(interlace_ms > 0.0 || centre_s == -0.005);
+                let pixels = (0..4).flat_map(|y| (0..6).map(move |x| [x, y]));
+                let times: Vec<f64> = pixels.map(|[x, y]| shutter.dt_pixel_s(x, y)).collect();
+                assert_eq!(first_s, times.iter().copied().fold(1.0, f64::min), "{readout:?} {interlace_ms}");
+                assert_eq!(last_s, times.iter().copied().fold(-1.0, f64::max), "{readout:?} {interlace_ms}");
+                assert_eq!(centre_s, -0.005);
             }
         }
     }
@@ -436,41 +452,49 @@ mod tests {
     }
 
     #[test]
+    fn the_centre_is_between_rows_that_have_the_delay_on_average() {
+        for readout in READOUTS {
+            for (interlace_ms, first_field) in [(0.0, Parity::Even), (7.0, Parity::Even), (7.0, Parity::Odd)]
+            {
+                for size_px in [[6, 8], [5, 9], [7, 6]] {
+                    let interlace_ms = FieldOr::Ms(interlace_ms);
+                    let spec = ShutterSpec { readout, interlace_ms, first_field, ..spec() };
+                    let shutter = Shutter::from_spec(&spec, 30.0, size_px).unwrap();
+                    let (first, second, share) = shutter.centre_lines();
+                    let centre_s = shutter.dt_row_s(first) * (1.0 - share) + shutter.dt_row_s(second) * share;
+                    let is_halved = matches!(readout, Readout::MiddleOutward | Readout::EdgesInward);
+                    let is_refused = is_halved && (size_px[1] % 2 == 1 || shutter.interlace_s() > 0.0);
+                    assert!(
+                        is_refused || (centre_s + 0.005).abs() < 1e-15,
+                        "{spec:?} {size_px:?}: {centre_s}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn halves_are_read_at_once() {
         let with = |readout| Shutter::from_spec(&ShutterSpec { readout, ..spec() }, 30.0, [6, 8]).unwrap();
         let (outward, inward) = (with(Readout::MiddleOutward), with(Readout::EdgesInward));
-        // Four pairs of rows, as a sensor of four rows would be read.
-        let four = Shutter::from_spec(&spec(), 30.0, [6, 4]).unwrap();
+        // Four pairs of rows, as a sensor of four rows would be read, from or to the middle.
         for pair in 0..4 {
+            let apart_s = 0.033 * f64::from(pair) / 4.0;
             for row in [3 - pair, 4 + pair] {
-                assert!((outward.dt_row_s(row) - four.dt_row_s(pair)).abs() < 1e-15);
-                assert!((inward.dt_row_s(row) - four.dt_row_s(3 - pair)).abs() < 1e-15);
+                assert!((outward.dt_row_s(row) - (-0.005 + apart_s)).abs() < 1e-15);
+                assert!((inward.dt_row_s(row) - (-0.005 - apart_s)).abs() < 1e-15);
             }
             assert_eq!(outward.dt_row_s(pair).to_bits(), outward.dt_row_s(7 - pair).to_bits());
         }
         for shutter in [outward, inward] {
             assert_eq!(shutter.window_s(), window_by_pixels(&shutter, [6, 8]));
             assert_eq!(shutter.row_axis(), RowAxis::Rows);
-            let instants = [FlowInstant::FirstRow, FlowInstant::Centre, FlowInstant::LastRow];
-            let found = instants.map(|instant| shutter.dt_instant_s(instant));
-            assert!((found[0] - four.dt_row_s(0)).abs() < 1e-15 && found[1] == -0.005, "{found:?}");
-            assert!((found[2] - four.dt_row_s(3)).abs() < 1e-15);
-            let (first, second, share) = shutter.centre_lines();
-            let mixed = shutter.dt_row_s(first) * (1.0 - share) + shutter.dt_row_s(second) * share;
-            assert!((mixed + 0.005).abs() < 1e-15, "{first} {second} {share}");
         }
     }
 
     #[test]
     fn a_global_reset_begins_all_exposures_at_once() {
-        for readout in [
-            Readout::TopToBottom,
-            Readout::BottomToTop,
-            Readout::LeftToRight,
-            Readout::RightToLeft,
-            Readout::MiddleOutward,
-            Readout::EdgesInward,
-        ] {
+        for readout in READOUTS {
             let spec = ShutterSpec { readout, reset: Reset::Global, ..spec() };
             let shutter = Shutter::from_spec(&spec, 30.0, [6, 8]).unwrap();
             let rolling = ShutterSpec { reset: Reset::Rolling, ..spec };

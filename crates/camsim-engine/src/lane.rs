@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::{
     Finished,
-    moving::{Lamps, MovingScene},
+    moving::{Lamps, Missed, MovingScene},
 };
 
 /// What a session keeps for its camera, or for one of its faces, beside the planner.
@@ -23,6 +23,7 @@ use crate::{
 pub(crate) struct Lane {
     pub moving: Option<MovingScene>,
     pub lamps: Option<Lamps>,
+    pub missed: Missed,
     pub ideal: Option<IdealCache>,
 }
 

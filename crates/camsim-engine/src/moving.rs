@@ -7,6 +7,7 @@
 //! Elsewhere nothing changes.
 
 mod lamps;
+mod missed;
 mod outline;
 mod painter;
 mod sweep;
@@ -16,14 +17,14 @@ pub const MOVING_RAYS: u32 = RAYS;
 
 use std::sync::Arc;
 
-use camsim_core::{photometric::Photometry, scene::Scene, sequence::Sequence, shutter::RowAxis};
-use camsim_cpu::{Instant, MovingCaster, RayScratch};
+use camsim_core::{scene::Scene, sequence::Sequence, shutter::RowAxis};
+use camsim_cpu::MovingCaster;
 use camsim_plan::FramePlan;
-use glam::{DMat2, DVec2, Vec3};
 
-use crate::truth::{RAYS, ray};
+use crate::truth::RAYS;
 pub(crate) use lamps::Lamps;
 pub use lamps::SMALL_LAMP_PX;
+pub(crate) use missed::Missed;
 use outline::Outline;
 use painter::{Painted, Painter, index};
 
@@ -91,45 +92,8 @@ impl MovingScene {
         let pixels = pixels.map(|along| outline::pixel(plan, line, along));
         let pixels: Vec<[u32; 2]> =
             pixels.filter(|&pixel| color_rgba[4 * index(plan, pixel) + 3] > 0.0).collect();
-        let Some(&[x, y]) = pixels.first() else { return Vec::new() };
-        let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-        let Sequence { path, scenario, .. } = &*self.painter.sequence;
-        let instants: Vec<(DVec2, Instant)> = (0..RAYS)
-            .map(ray)
-            .map(|(place, phase)| {
-                let t_s = mid_s + phase * plan.shutter.exposure_pixel_s(x, y);
-                (place, caster.at(t_s, path.pose(t_s)))
-            })
-            .collect();
-        let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
-        let mut scratch = RayScratch::default();
-        let color = |pixel: [u32; 2]| {
-            let light = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
-            Some(self.painter.finished(&stage, plan, pixel, light))
-        };
-        pixels.into_iter().filter_map(color).collect()
+        self.painter.means(caster, plan, &pixels)
     }
-}
-
-/// Mean over a pixel's area and exposure, linear R G B.
-fn mean_color(
-    caster: &MovingCaster,
-    plan: &FramePlan,
-    instants: &[(DVec2, Instant)],
-    pixel: [u32; 2],
-    scratch: &mut RayScratch,
-) -> Option<Vec3> {
-    let camera = &plan.camera;
-    let uv = camera.unproject(DVec2::from_array(pixel.map(f64::from)))?;
-    let px_from_uv = DMat2::from_diagonal(camera.focal_px) * camera.lens.jacobian(uv);
-    let uv_from_px = px_from_uv.inverse();
-    // Each ray stands for its part of the pixel's area.
-    let share = f64::from(instants.len() as u32).sqrt().recip();
-    let step_uv = share * DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length());
-    let ray = |(place, instant): &(DVec2, Instant)| {
-        caster.color(instant, uv + uv_from_px * *place, step_uv, plan.surface_reads, scratch)
-    };
-    Some(instants.iter().map(ray).sum::<Vec3>() / instants.len() as f32)
 }
 
 /// Number of rows of the readout, with those of either field for columns.

@@ -395,6 +395,8 @@ impl<'a> Session<'a> {
     ) -> Result<RenderedFrame, PlanError> {
         let sequence = self.planner.lane(lane).sequence().clone();
         let is_other = is_beside_green(plan);
+        let whole = self.scene_planner().lane(lane).sequence().clone();
+        self.lanes[lane].missed.paint(&mut color_rgba, truth.as_mut(), plan, &whole);
         if let Some(moving) = &self.lanes[lane].moving {
             moving.paint(&mut color_rgba, plan);
         }

@@ -190,9 +190,17 @@ pub(super) fn between(points: &[[f64; 2]], from: usize, value: f64) -> f64 {
     }
 }
 
+/// Quantum efficiencies of red, green, blue and white. Of three, white has their luminance, as it sees luminance.
+fn efficiencies(spec: &ImageSensorSpec) -> [f64; 4] {
+    let Some(stated) = &spec.quantum_efficiency else { return [1.0; 4] };
+    let rgb = stated.rgb();
+    let luminance = (0..3).map(|channel| LUMINANCE[channel] * rgb[channel]).sum();
+    [rgb[0], rgb[1], rgb[2], stated.white().unwrap_or(luminance)]
+}
+
 /// Electrons that the scene's white makes in the channels red, green, blue and white.
 fn white_electrons(spec: &ImageSensorSpec, exposure_s: f64) -> [f64; 4] {
-    let efficiency = spec.quantum_efficiency.as_ref().map_or([1.0; 4], |efficiency| efficiency.rgbw());
+    let efficiency = efficiencies(spec);
     let area_m2 = spec.pixel_um.map_or(0.0, |side_um| (side_um * 1e-6).powi(2));
     let photons =
         |w_m2: f64, wavelength_m: f64| w_m2 * area_m2 * exposure_s * wavelength_m / PLANCK_TIMES_LIGHT;
@@ -225,6 +233,7 @@ fn weights(spec: &ImageSensorSpec, white_e: [f64; 4]) -> [[f32; 3]; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::PerChannel;
 
     fn spec() -> ImageSensorSpec {
         ImageSensorSpec { white_e: Some(8000.0), ..ImageSensorSpec::default() }
@@ -238,7 +247,7 @@ mod tests {
             white_w_m2: Some(0.01),
             wavelength_nm: 530.0,
             pixel_um: Some(3.45),
-            quantum_efficiency: Some(crate::scenario::PerChannel::One(0.5)),
+            quantum_efficiency: Some(PerChannel::One(0.5)),
             ..spec()
         };
         let expected = 0.5 * 50.34 * 3.45 * 3.45 * 8.0 * 0.53 * 1.0;
@@ -260,6 +269,17 @@ mod tests {
         let expected = 1000.0 * 0.9 / 64.0 * 4.0907e15 * 25e-12 * 2e-3;
         let found = white_electrons(&spec, 2e-3)[0];
         assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+    }
+
+    #[test]
+    fn white_pixels_have_an_efficiency_of_their_own() {
+        let white_e = |values: &[f64]| {
+            let quantum_efficiency = Some(PerChannel::Each(values.to_vec()));
+            white_electrons(&ImageSensorSpec { quantum_efficiency, mosaic: Mosaic::Rgbw, ..spec() }, 1e-3)
+        };
+        assert_eq!(white_e(&[0.4, 0.5, 0.2, 0.75]), [6400.0, 8000.0, 3200.0, 12000.0]);
+        let luminance = 0.2126 * 0.4 + 0.7152 * 0.5 + 0.0722 * 0.2;
+        assert!((white_e(&[0.4, 0.5, 0.2])[3] - 16000.0 * luminance).abs() < 1e-9);
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //! the instants of that picture's rows.
 //!
 //! The equation `place = project(camera(t(place)), point(t(place)))` along the readout is looked at in steps of
-//! one pixel, from border to border, and each change of sign is closed in on by bisection.
+//! half a pixel, from border to border. Each change of sign is closed in on by bisection, and each turn near zero by
+//! thirds, as two solutions may be beside it.
 
 use glam::{DVec2, DVec3};
 
@@ -13,8 +14,13 @@ use crate::{
     scene::RigidMotion,
 };
 
-/// Halvings of an interval of one pixel.
+/// Step along the readout, pixels: the centres of rows, where the speed of the readout may change, are among the
+/// places.
+const STEP_PX: f64 = 0.5;
+/// Halvings of an interval of one step.
 const BISECTIONS: u32 = 36;
+/// Steps towards the turn of a miss: to 1e-5 of two intervals.
+const THIRDS: u32 = 28;
 /// Step of the derivative by differences, seconds.
 const STEP_S: f64 = 1e-4;
 
@@ -38,7 +44,7 @@ pub(super) struct FlowPicture<'a> {
     fields: Vec<FieldScan>,
 }
 
-/// The readout of one field, in steps of one pixel from border to border.
+/// The readout of one field, in steps from border to border.
 #[derive(Debug)]
 struct FieldScan {
     /// An image row of the field.
@@ -54,6 +60,13 @@ struct Place {
     pose: CameraPose,
 }
 
+/// A place along the readout, pixels, and what its camera misses it by.
+type Miss = (f64, Option<f64>);
+
+fn changes_sign(a: Miss, b: Miss) -> bool {
+    a.1.zip(b.1).is_some_and(|(a, b)| (a >= 0.0) != (b >= 0.0))
+}
+
 impl Oracle {
     /// The picture of a frame of any number.
     pub(super) fn flow_frame(&self, frame: i64) -> FlowPicture<'_> {
@@ -65,11 +78,11 @@ impl Oracle {
             let low_px = (first - 0.5 * step).max(-0.5);
             let high_px = (last + 0.5 * step).min(f64::from(self.timing.lines()) - 0.5);
             let place = |k: u32| {
-                let along_px = (low_px + f64::from(k)).min(high_px);
+                let along_px = (low_px + STEP_PX * f64::from(k)).min(high_px);
                 let t_s = stamp_s + self.timing.dt_along_s(along_px, row);
                 (along_px, t_s, self.sequence.path.pose(t_s))
             };
-            FieldScan { row, places: (0..=(high_px - low_px).ceil() as u32).map(place).collect() }
+            FieldScan { row, places: (0..=((high_px - low_px) / STEP_PX).ceil() as u32).map(place).collect() }
         };
         FlowPicture {
             oracle: self,
@@ -83,12 +96,7 @@ impl Oracle {
     /// The picture of a frame's camera with all rows at one instant.
     pub(super) fn flow_global(&self, frame: u64, instant: FlowInstant) -> FlowPicture<'_> {
         let stamp_s = self.timing.stamp_s(frame);
-        let ends_s = self.timing.ends_s();
-        let dt_s = match instant {
-            FlowInstant::FirstRow => ends_s[0].min(ends_s[1]),
-            FlowInstant::Centre => 0.5 * (ends_s[0] + ends_s[1]),
-            FlowInstant::LastRow => ends_s[0].max(ends_s[1]),
-        };
+        let dt_s = self.timing.instant_s(instant);
         let lens = self.lens_of(stamp_s);
         FlowPicture { oracle: self, lens, stamp_s, global_s: Some(stamp_s + dt_s), fields: Vec::new() }
     }
@@ -154,23 +162,28 @@ impl FlowPicture<'_> {
     /// Displacement of what a pixel sees, pixels, and state: the channels `flow`, `flow_back` and `flow_global`.
     pub(super) fn flow(&self, from_px: DVec2, seen: &RaySample) -> (DVec2, FlowState) {
         let goal = self.oracle.goal(seen);
-        let places = self.places(goal);
-        let nearest = places.iter().min_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
-        let Some(place) = nearest else {
+        let mut places = self.places(goal);
+        places.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+        let Some(nearest) = places.first() else {
             return self
                 .outside(goal, from_px)
                 .map_or((DVec2::ZERO, FlowState::None), |px| (px - from_px, FlowState::Outside));
         };
+        let shown: Vec<&Place> = places.iter().filter(|place| !self.is_hidden(goal, place)).collect();
+        let (place, state) = match shown.as_slice() {
+            [] => (nearest, FlowState::Occluded),
+            [only] => (*only, FlowState::Visible),
+            [nearest, ..] => (*nearest, FlowState::Several),
+        };
+        (place.px - from_px, state)
+    }
+
+    /// Whether something is in front of a goal at one of its places.
+    fn is_hidden(&self, goal: Goal<'_>, place: &Place) -> bool {
         let way = goal.way_from(&place.pose, place.t_s);
         let hit = self.oracle.cast_at(place.t_s, place.pose.position_ned_m, way);
         // The parameter is 1 at the place; the sky is infinitely far away.
-        let is_hidden = hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6);
-        let state = match (is_hidden, places.len()) {
-            (true, _) => FlowState::Occluded,
-            (false, 1) => FlowState::Visible,
-            (false, _) => FlowState::Several,
-        };
-        (place.px - from_px, state)
+        hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6)
     }
 
     fn is_in_picture(&self, px: DVec2) -> bool {
@@ -215,29 +228,80 @@ impl FlowPicture<'_> {
     }
 
     fn places_of_field(&self, field: &FieldScan, goal: Goal<'_>) -> Vec<Place> {
-        let miss = |along_px: f64, t_s: f64, pose: &CameraPose| {
-            Some(self.along(self.lens.show(pose, t_s, goal)?) - along_px)
-        };
-        let misses: Vec<Option<f64>> =
-            field.places.iter().map(|(along_px, t_s, pose)| miss(*along_px, *t_s, pose)).collect();
+        let misses: Vec<Miss> = field
+            .places
+            .iter()
+            .map(|(along_px, t_s, pose)| (*along_px, self.miss(*along_px, *t_s, pose, goal)))
+            .collect();
         let mut found = Vec::new();
-        for (k, pair) in misses.windows(2).enumerate() {
-            let &[Some(before), Some(after)] = pair else { continue };
-            if (before >= 0.0) == (after >= 0.0) {
-                continue;
+        for (k, &before) in misses.iter().enumerate() {
+            if let Some(&after) = misses.get(k + 1)
+                && changes_sign(before, after)
+            {
+                found.extend(self.place_between(field, goal, before, after));
             }
-            let (mut low, mut high) = (field.places[k].0, field.places[k + 1].0);
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (low + high);
-                let (t_s, pose) = self.camera(field, middle);
-                let is_before = miss(middle, t_s, &pose).is_some_and(|miss| (miss >= 0.0) == (before >= 0.0));
-                if is_before { low = middle } else { high = middle }
+            if let Some((turn, [low, high])) = self.turn_beyond_zero(field, goal, &misses, k) {
+                found.extend(self.place_between(field, goal, low, turn));
+                found.extend(self.place_between(field, goal, turn, high));
             }
-            let (t_s, pose) = self.camera(field, 0.5 * (low + high));
-            let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px));
-            found.extend(px.map(|px| Place { px, t_s, pose }));
         }
         found
+    }
+
+    /// The place along the readout at which a goal is seen from the camera of another, less that other one.
+    fn miss(&self, along_px: f64, t_s: f64, pose: &CameraPose, goal: Goal<'_>) -> Option<f64> {
+        Some(self.along(self.lens.show(pose, t_s, goal)?) - along_px)
+    }
+
+    fn miss_at(&self, field: &FieldScan, along_px: f64, goal: Goal<'_>) -> Miss {
+        let (t_s, pose) = self.camera(field, along_px);
+        (along_px, self.miss(along_px, t_s, &pose, goal))
+    }
+
+    /// The solution between two misses of different signs.
+    fn place_between(&self, field: &FieldScan, goal: Goal<'_>, before: Miss, after: Miss) -> Option<Place> {
+        let (mut low, mut high) = (before.0, after.0);
+        for _ in 0..BISECTIONS {
+            let middle = self.miss_at(field, 0.5 * (low + high), goal);
+            if middle.1.is_some() && !changes_sign(before, middle) { low = middle.0 } else { high = middle.0 }
+        }
+        let (t_s, pose) = self.camera(field, 0.5 * (low + high));
+        let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px))?;
+        Some(Place { px, t_s, pose })
+    }
+
+    /// A miss of the other sign next to one that is less than those before and behind it, closed in on by thirds,
+    /// with these two: one solution is before it and one behind.
+    fn turn_beyond_zero(
+        &self,
+        field: &FieldScan,
+        goal: Goal<'_>,
+        misses: &[Miss],
+        k: usize,
+    ) -> Option<(Miss, [Miss; 2])> {
+        let last = misses.len() - 1;
+        let (at, beside) = (misses[k], [misses[k.saturating_sub(1)], misses[last.min(k + 1)]]);
+        let [before, here, behind] = [beside[0].1?, at.1?, beside[1].1?].map(f64::abs);
+        let is_least = (k == 0 || here < before) && here <= behind;
+        if !is_least || beside.iter().any(|&miss| changes_sign(at, miss)) {
+            return None;
+        }
+        // A parabola goes on by no more than an eighth of its second difference.
+        let middle = k.min(last.saturating_sub(1)).max(1);
+        let three = misses.get(middle - 1..=middle + 1)?;
+        if here > (three[0].1? - 2.0 * three[1].1? + three[2].1?).abs() {
+            return None;
+        }
+        let (mut from, mut to) = (beside[0].0, beside[1].0);
+        for _ in 0..THIRDS {
+            let places = [(2.0 * from + to) / 3.0, (from + 2.0 * to) / 3.0];
+            let [first, second] = places.map(|along_px| self.miss_at(field, along_px, goal));
+            if let Some(beyond) = [first, second].into_iter().find(|&miss| changes_sign(at, miss)) {
+                return Some((beyond, beside));
+            }
+            if first.1?.abs() < second.1?.abs() { to = places[1] } else { from = places[0] }
+        }
+        None
     }
 
     fn camera(&self, field: &FieldScan, along_px: f64) -> (f64, CameraPose) {

@@ -1,7 +1,7 @@
 //! Times of the oracle: frame stamps, and the mid-exposure of each pixel.
 
 use crate::{
-    scenario::{CameraSpec, FieldOr, Parity, Readout, Reset},
+    scenario::{CameraSpec, FieldOr, FlowInstant, Parity, Readout, Reset},
     sequence::Sequence,
     timing_faults::TimingFaults,
 };
@@ -63,12 +63,13 @@ impl FrameTiming {
     }
 
     /// Mid-exposure of a pixel relative to the stamp of its frame. The rows, counted along the readout, share
-    /// the readout time evenly about `-delay`; rows of the first field are earlier by the interlacing lag.
+    /// the readout time evenly, with `-delay` in the image's centre; rows of the first field are earlier by the
+    /// interlacing lag.
     pub(super) fn dt_s(&self, [x, y]: [u32; 2]) -> f64 {
         self.dt_along_s(f64::from(if self.reads_rows() { y } else { x }), y)
     }
 
-    /// Mid-exposure of a place along the readout, pixels, in the field of an image row.
+    /// Mid-exposure of a place along the readout, pixels, in the field of an image row: linear from row to row.
     pub(super) fn dt_along_s(&self, along_px: f64, row: u32) -> f64 {
         let (nth, count) = self.place_in_readout(along_px);
         let lag_s =
@@ -78,13 +79,34 @@ impl FrameTiming {
             Reset::Rolling => self.readout_s,
             Reset::Global => self.readout_s / 2.0,
         };
-        spread_s * (2.0 * nth + 1.0 - count) / (2.0 * count) - self.delay_s - lag_s
+        let nth_of_centre = match self.readout {
+            Readout::MiddleOutward => 0.0,
+            Readout::EdgesInward => count - 1.0,
+            _ => (count - 1.0) / 2.0,
+        };
+        spread_s * (nth - nth_of_centre) / count - self.delay_s - lag_s
+    }
+
+    /// An instant of the frame relative to its stamp: that of the image's centre, or of the first or last of all
+    /// mid-exposures.
+    pub(super) fn instant_s(&self, instant: FlowInstant) -> f64 {
+        let rows = 0..2.min(self.size_px[1]);
+        let of_line = |line| {
+            if self.reads_rows() { vec![[0, line]] } else { rows.clone().map(|y| [line, y]).collect() }
+        };
+        let times = (0..self.lines()).flat_map(of_line).map(|pixel| self.dt_s(pixel));
+        match instant {
+            FlowInstant::FirstRow => times.fold(f64::INFINITY, f64::min),
+            FlowInstant::Centre => -self.delay_s,
+            FlowInstant::LastRow => times.fold(f64::NEG_INFINITY, f64::max),
+        }
     }
 
     /// How many rows are read before a place along the readout, and how many are read one after the other.
     fn place_in_readout(&self, along_px: f64) -> (f64, f64) {
         let count = f64::from(self.lines());
-        let from_edge = along_px.min(count - 1.0 - along_px);
+        // What is between the two middle rows has their time.
+        let from_edge = along_px.min(count - 1.0 - along_px).min(count / 2.0 - 1.0);
         match self.readout {
             Readout::TopToBottom | Readout::LeftToRight => (along_px, count),
             Readout::BottomToTop | Readout::RightToLeft => (count - 1.0 - along_px, count),
@@ -102,16 +124,6 @@ impl FrameTiming {
             let later_row = u32::from(self.first_field == Parity::Even);
             self.dt_s([line, later_row])
         }
-    }
-
-    /// Mid-exposures of two rows, relative to the stamp, of which one is the first that is read and the other
-    /// the last.
-    pub(super) fn ends_s(&self) -> [f64; 2] {
-        let other = match self.readout {
-            Readout::MiddleOutward | Readout::EdgesInward => self.lines() / 2,
-            _ => self.lines() - 1,
-        };
-        [0, other].map(|line| self.dt_row_s(line))
     }
 
     /// Number of rows (or columns) of the readout.

@@ -1,13 +1,13 @@
-//! Where a frame shows many points: as [`FrameCamera::find`], from a guess and by matrices of the rows.
+//! Where a frame shows many points: as [`FrameCamera::find_all`], from a guess and by matrices of the rows.
 //!
 //! While a row is read, the picture of a point moves by less than [`MOST_SPEED`] rows in most frames. The
 //! equation of the row then has one solution, and Newton's step from row to row finds it. Between two rows the
 //! projection is taken as linear, if the rows' poses show that this is exact to [`STRAIGHT_PX`]. Points for
-//! which either is not sure are left to [`FrameCamera::find`].
+//! which either is not sure are left to [`FrameCamera::find_all`].
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::{Field, FrameCamera, Projection, WorldPoint};
+use super::{Field, FrameCamera, ImagePoint, Projection, WorldPoint, field::turn_between};
 use crate::{camera::CameraModel, pose::CameraPose};
 
 /// Rows by which the picture may move while a row is read. The reserve to 1 is for the movement outside of the
@@ -18,7 +18,7 @@ const STRAIGHT_PX: f64 = 3e-4;
 /// Steps from row to row, at most.
 const MOST_STEPS: usize = 6;
 
-/// Where a frame shows a point. As [`super::ImagePoint`] without the camera's attitude.
+/// A place at which a frame shows a point, within the picture's outer border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shown {
     /// Pixel coordinates.
@@ -29,10 +29,6 @@ pub struct Shown {
     pub position_ned_m: DVec3,
     /// Planar depth, metres; infinite for a direction.
     pub depth_m: f64,
-    /// Whether the position is within the picture's outer border.
-    pub is_inside: bool,
-    /// Number of positions at which the frame shows the point.
-    pub solutions: u32,
 }
 
 /// How far turns and shifts of a camera move its picture.
@@ -42,6 +38,12 @@ pub struct ImageGain {
     pub turn_px: f64,
     /// Pixels for a shift by 1 m at a planar depth of 1 m, at most.
     pub shift_px: f64,
+}
+
+impl From<ImagePoint> for Shown {
+    fn from(ImagePoint { px, t_s, pose, depth_m, .. }: ImagePoint) -> Self {
+        Self { px, t_s, position_ned_m: pose.position_ned_m, depth_m }
+    }
 }
 
 impl ImageGain {
@@ -77,7 +79,7 @@ impl ImageGain {
 pub struct RowProjector<'a> {
     frame: &'a FrameCamera,
     rows: Vec<Row>,
-    /// `None` where every point is left to [`FrameCamera::find`].
+    /// `None` where every point is left to [`FrameCamera::find_all`].
     limits: Option<Limits>,
     contained_radius2: f64,
 }
@@ -122,14 +124,12 @@ impl Row {
 
 impl Limits {
     fn new(frame: &FrameCamera, field: &Field) -> Option<Self> {
-        let gain = ImageGain::new(&frame.camera);
+        let gain = frame.gain;
         let mut most = [0.0_f64; 4];
         let mut before = None;
         let mut travel_m = 0.0_f64;
         for (from, to) in field.poses.iter().zip(&field.poses[1..]) {
-            let turned = from.ned_from_camera.conjugate() * to.ned_from_camera;
-            // Twice the vector of a small rotation's quaternion is its angle.
-            let turn = 2.0 * turned.xyz() * turned.w.signum();
+            let turn = turn_between(from, to);
             let shift = to.position_ned_m - from.position_ned_m;
             let (turn_change, shift_change) = before
                 .map_or((0.0, 0.0), |(t, s): (DVec3, DVec3)| ((turn - t).length(), (shift - s).length()));
@@ -172,24 +172,10 @@ impl RowProjector<'_> {
         self.frame
     }
 
-    /// As [`FrameCamera::find`]: where the frame shows a point. `guess_px` is where it is looked for first, and
-    /// need not be near.
+    /// The one position at which the frame shows a point, looked for from `guess_px` on, which need not be near.
+    /// `None` where the point has to be looked for in the whole readout ([`FrameCamera::find_all`]).
     #[must_use]
-    pub fn find(&self, point: WorldPoint<'_>, near_px: DVec2, guess_px: DVec2) -> Option<Shown> {
-        self.by_steps(point, guess_px).or_else(|| {
-            self.frame.find(point, near_px).map(|seen| Shown {
-                px: seen.px,
-                t_s: seen.t_s,
-                position_ned_m: seen.pose.position_ned_m,
-                depth_m: seen.depth_m,
-                is_inside: seen.is_inside,
-                solutions: seen.solutions,
-            })
-        })
-    }
-
-    /// `None` where the point has to be looked for in the whole readout.
-    pub(super) fn by_steps(&self, point: WorldPoint<'_>, guess_px: DVec2) -> Option<Shown> {
+    pub fn by_steps(&self, point: WorldPoint<'_>, guess_px: DVec2) -> Option<Shown> {
         let limits = self.limits?;
         let field = self.frame.fields.first()?;
         let (place, is_far) = match point {
@@ -231,16 +217,14 @@ impl RowProjector<'_> {
         None
     }
 
-    /// `None` outside of the picture, where [`FrameCamera::find`] knows which row is meant.
+    /// `None` outside of the picture.
     fn shown(
         &self,
         t_s: f64,
         position_ned_m: DVec3,
         Projection { px, depth_m }: Projection,
     ) -> Option<Shown> {
-        let [width, height] = self.frame.camera.size_px.map(f64::from);
-        let is_inside = px.cmpge(DVec2::splat(-0.5)).all() && px.cmplt(DVec2::new(width, height) - 0.5).all();
-        is_inside.then_some(Shown { px, t_s, position_ned_m, depth_m, is_inside, solutions: 1 })
+        self.frame.camera.holds(px).then_some(Shown { px, t_s, position_ned_m, depth_m })
     }
 
     #[inline]

@@ -34,7 +34,8 @@ pub struct ImageSensorSpec {
     /// Side of a pixel, for `white_lux` and `white_w_m2`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel_um: Option<f64>,
-    /// Electrons per photon: one number, or those of red, green and blue, and of white with `rgbw`; else 1.
+    /// Electrons per photon: one number, or those of red, green and blue, and of white with `rgbw` (left out: the
+    /// luminance of the three); else 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantum_efficiency: Option<PerChannel>,
     /// What the channels red, green and blue see of the scene's linear R, G, B, row by row.
@@ -199,15 +200,21 @@ pub enum PerChannel {
 }
 
 impl PerChannel {
-    /// Values of red, green, blue and white; the last one counts for those that are missing.
+    /// Values of red, green and blue.
     #[must_use]
-    pub fn rgbw(&self) -> [f64; 4] {
+    pub fn rgb(&self) -> [f64; 3] {
+        [0, 1, 2].map(|channel| match self {
+            Self::One(value) => *value,
+            Self::Each(values) => values.get(channel).copied().unwrap_or(1.0),
+        })
+    }
+
+    /// The value of white, where it is stated.
+    #[must_use]
+    pub fn white(&self) -> Option<f64> {
         match self {
-            Self::One(value) => [*value; 4],
-            Self::Each(values) => {
-                let last = values.last().copied().unwrap_or(1.0);
-                [0, 1, 2, 3].map(|channel: usize| values.get(channel).copied().unwrap_or(last))
-            }
+            Self::One(value) => Some(*value),
+            Self::Each(values) => values.get(3).copied(),
         }
     }
 }

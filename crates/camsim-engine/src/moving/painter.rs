@@ -7,10 +7,12 @@ use camsim_core::{
     photometric::{Photometry, photometric},
     sequence::Sequence,
 };
-use camsim_cpu::MovingCaster;
+use camsim_cpu::{Instant, MovingCaster, RayScratch};
 use camsim_plan::FramePlan;
-use glam::Vec3;
+use glam::{DMat2, DVec2, Vec3};
 use rayon::prelude::*;
+
+use crate::truth::{RAYS, ray};
 
 /// What is painted with: rays through everything in a scene, and what follows the light of a pixel.
 #[derive(Debug)]
@@ -42,6 +44,27 @@ impl Painter {
         self.caster.get_or_init(|| MovingCaster::new(&self.sequence.scene))
     }
 
+    /// Colours of pixels of one row of the readout: means of rays over area and exposure.
+    pub fn means(&self, caster: &MovingCaster, plan: &FramePlan, pixels: &[[u32; 2]]) -> Vec<Painted> {
+        let Some(&[x, y]) = pixels.first() else { return Vec::new() };
+        let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+        let Sequence { path, scenario, .. } = &*self.sequence;
+        let instants: Vec<(DVec2, Instant)> = (0..RAYS)
+            .map(ray)
+            .map(|(place, phase)| {
+                let t_s = mid_s + phase * plan.shutter.exposure_pixel_s(x, y);
+                (place, caster.at(t_s, path.pose(t_s)))
+            })
+            .collect();
+        let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
+        let mut scratch = RayScratch::default();
+        let color = |&pixel: &[u32; 2]| {
+            let light = mean_color(caster, plan, &instants, pixel, &mut scratch)?;
+            Some(self.finished(&stage, plan, pixel, light))
+        };
+        pixels.iter().filter_map(color).collect()
+    }
+
     /// The colour of a pixel with this light.
     pub fn finished(&self, stage: &Photometry, plan: &FramePlan, pixel: [u32; 2], light: Vec3) -> Painted {
         let scenario = &self.sequence.scenario;
@@ -64,6 +87,27 @@ impl Painter {
             color_rgba[4 * i..4 * i + 3].copy_from_slice(&color);
         }
     }
+}
+
+/// Mean over a pixel's area and exposure, linear R G B.
+fn mean_color(
+    caster: &MovingCaster,
+    plan: &FramePlan,
+    instants: &[(DVec2, Instant)],
+    pixel: [u32; 2],
+    scratch: &mut RayScratch,
+) -> Option<Vec3> {
+    let camera = &plan.camera;
+    let uv = camera.unproject(DVec2::from_array(pixel.map(f64::from)))?;
+    let px_from_uv = DMat2::from_diagonal(camera.focal_px) * camera.lens.jacobian(uv);
+    let uv_from_px = px_from_uv.inverse();
+    // Each ray stands for its part of the pixel's area.
+    let share = f64::from(instants.len() as u32).sqrt().recip();
+    let step_uv = share * DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length());
+    let ray = |(place, instant): &(DVec2, Instant)| {
+        caster.color(instant, uv + uv_from_px * *place, step_uv, plan.surface_reads, scratch)
+    };
+    Some(instants.iter().map(ray).sum::<Vec3>() / instants.len() as f32)
 }
 
 /// Index of a pixel in its picture.

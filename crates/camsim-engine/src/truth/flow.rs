@@ -56,30 +56,45 @@ impl Landing<'_> {
     fn find(&self, before: DVec2) -> Option<(DVec2, FlowState)> {
         let from_px = DVec2::from_array(self.pixel.position.map(f64::from));
         let point = world_point(self.pixels, self.pixel);
-        let seen = self.projector.find(point, from_px, from_px + before)?;
-        let state = match seen.is_inside {
-            false => FlowState::Outside,
-            true if self.is_hidden(point, &seen)? => FlowState::Occluded,
-            true if seen.solutions > 1 => FlowState::Several,
-            true => FlowState::Visible,
+        let (px, state) = match self.projector.by_steps(point, from_px + before) {
+            Some(only) if self.is_hidden(point, &only) => (only.px, FlowState::Occluded),
+            Some(only) => (only.px, FlowState::Visible),
+            None => self.find_all(point, from_px)?,
         };
-        Some((seen.px - from_px, state))
+        Some((px - from_px, state))
     }
 
-    fn is_hidden(&self, point: WorldPoint<'_>, seen: &Shown) -> Option<bool> {
+    /// Where the picture shows the point; of several places the nearest at which nothing is in front of it.
+    fn find_all(&self, point: WorldPoint<'_>, from_px: DVec2) -> Option<(DVec2, FlowState)> {
+        let target = self.projector.frame();
+        let mut places = target.find_all(point);
+        places.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+        let Some(nearest) = places.first() else {
+            return target.outside(point, from_px).map(|px| (px, FlowState::Outside));
+        };
+        let mut seen = places.iter().filter(|place| !self.is_hidden(point, &Shown::from(**place)));
+        Some(match (seen.next(), seen.next()) {
+            (None, _) => (nearest.px, FlowState::Occluded),
+            (Some(only), None) => (only.px, FlowState::Visible),
+            (Some(nearest), Some(_)) => (nearest.px, FlowState::Several),
+        })
+    }
+
+    fn is_hidden(&self, point: WorldPoint<'_>, place: &Shown) -> bool {
         let rays = self.pixels.rays;
         if !self.is_in_doubt && !rays.has_models() {
-            return Some(false);
+            return false;
         }
-        let Shown { t_s, position_ned_m, depth_m, .. } = *seen;
+        let Shown { t_s, position_ned_m, depth_m, .. } = *place;
         let ray_ned = match point {
-            WorldPoint::Towards(direction_ned) => direction_ned,
-            _ => (point.position_ned_m(t_s)? - position_ned_m) / depth_m,
+            WorldPoint::Towards(direction_ned) => Some(direction_ned),
+            _ => point.position_ned_m(t_s).map(|now_ned_m| (now_ned_m - position_ned_m) / depth_m),
         };
-        Some(match self.is_in_doubt {
+        let hides = |ray_ned| match self.is_in_doubt {
             true => rays.is_hidden(t_s, position_ned_m, ray_ned, depth_m),
             false => rays.is_behind_model(t_s, position_ned_m, ray_ned, depth_m),
-        })
+        };
+        ray_ned.is_some_and(hides)
     }
 }
 

@@ -192,11 +192,10 @@ fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, notes: &[String]) -> Strin
 pub(super) fn timing(camera: &RunCamera) -> String {
     let shutter = &camera.shutter;
     let [delay_ms, readout_ms] = [shutter.delay_s(), shutter.readout_s()].map(|s| 1e3 * s);
-    let middle = if shutter.is_split() { "the middle of the readout" } else { "the image's centre" };
     let centre = if delay_ms == 0.0 {
-        format!("{middle} is exposed at the stamp (middle of the exposure)")
+        "the image's centre is exposed at the stamp (middle of the exposure)".to_owned()
     } else {
-        format!("{middle} is exposed {delay_ms} ms before the stamp (middle of the exposure)")
+        format!("the image's centre is exposed {delay_ms} ms before the stamp (middle of the exposure)")
     };
     let offset_ms = camera.spec.clock_offset_ms;
     let centre = match offset_ms == 0.0 {
@@ -217,8 +216,8 @@ pub(super) fn timing(camera: &RunCamera) -> String {
         (shutter.reset() == Reset::Global, shutter.lines(), direction(camera));
     let apart_ms = if resets_globally { 0.5 * readout_ms } else { readout_ms };
     let share = match camera.spec.shutter.readout {
-        Readout::MiddleOutward => "(|2y + 1 - N|/N - 0.5)",
-        Readout::EdgesInward => "(0.5 - |2y + 1 - N|/N)",
+        Readout::MiddleOutward => "(|2y + 1 - N| - 1)/N",
+        Readout::EdgesInward => "(1 - |2y + 1 - N|)/N",
         _ => "((y + 0.5)/N - 0.5)",
     };
     let growing = match resets_globally {

@@ -1,7 +1,7 @@
 //! What a scenario has to write for a layout.
 
 use camsim_core::scenario::{
-    Channel, DatasetFormat, FieldOr, ImageFormat, LensModel, OutputSpec, PointSource, Scenario, TracksSpec,
+    Channel, DatasetFormat, ImageFormat, LensModel, OutputSpec, PointSource, Scenario, TracksSpec,
 };
 
 use super::{DatasetError, twins::TwinNeed};
@@ -13,7 +13,7 @@ use super::{DatasetError, twins::TwinNeed};
 /// A twin has the name of one that is needed, and is another.
 pub fn require(scenario: &mut Scenario, format: DatasetFormat) -> Result<Vec<String>, DatasetError> {
     let shutter = &scenario.camera.shutter;
-    let is_prompt = shutter.delay_ms == 0.0 && shutter.interlace_ms == FieldOr::Ms(0.0);
+    let is_prompt = shutter.delay_ms == 0.0;
     let lens = &scenario.camera.lens;
     let has_lens = match lens.model {
         LensModel::Pinhole => false,
@@ -26,7 +26,7 @@ pub fn require(scenario: &mut Scenario, format: DatasetFormat) -> Result<Vec<Str
     }
     let output = &mut scenario.output;
     let mut channels = vec![Channel::Color];
-    // Poses of pictures are those of the middle row.
+    // Poses of pictures are those of the image's centre.
     if has_poses(format) && !is_prompt {
         channels.push(Channel::Rows);
     }

@@ -236,11 +236,10 @@ impl RunCamera {
     /// Whether the centre is exposed at the stamp.
     #[must_use]
     pub fn is_prompt(&self) -> bool {
-        self.shutter.delay_s() == 0.0 && self.shutter.interlace_s() == 0.0
+        self.shutter.delay_s() == 0.0
     }
 
-    /// Pose at the mid-exposure of the image's centre, or of the middle of a readout in halves: that at the stamp,
-    /// or that between two rows.
+    /// Pose at the mid-exposure of the image's centre: that at the stamp, or that between two rows.
     ///
     /// # Errors
     /// The camera has a delay, and the frames no `rows`.

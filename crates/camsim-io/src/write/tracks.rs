@@ -273,7 +273,7 @@ mod tests {
     fn sighting(point: usize, x: f64) -> Sighting {
         let pose = CameraPose { position_ned_m: DVec3::ZERO, ned_from_camera: DQuat::IDENTITY };
         let px = DVec2::new(x, 7.5);
-        let seen = ImagePoint { px, t_s: -0.5, pose, depth_m: 100.25, is_inside: true, solutions: 2 };
+        let seen = ImagePoint { px, t_s: -0.5, pose, depth_m: 100.25, solutions: 2 };
         Sighting { point, seen, is_visible: point == 0 }
     }
 

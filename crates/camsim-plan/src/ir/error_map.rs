@@ -34,7 +34,8 @@ pub enum SourceError {
     /// It is beside a silhouette, or what it sees is hidden from the ideal frame's camera: such pixels are
     /// counted apart.
     Silhouette,
-    /// What it sees lies outside of the ideal frame: the pixel stays empty.
+    /// What it sees lies outside of the ideal frame: the pixel gets rays of its own; with the paper's preset it stays
+    /// empty.
     NoSource,
 }
 

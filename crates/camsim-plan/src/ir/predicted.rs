@@ -42,8 +42,8 @@ pub struct Predicted {
     /// Share of the pixels that are counted apart: at a silhouette or disoccluded. To within some hundredths,
     /// and too low where folds of depth lie between the nine rays that look for them.
     pub silhouette_share: f64,
-    /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and
-    /// their pixels stay empty.
+    /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame
+    /// ([`SourceError::NoSource`](super::error_map::SourceError::NoSource)).
     pub void_share: f64,
     /// Disocclusion with the plan's key frames; `None` where it is not looked for.
     pub disocclusion: Option<Disocclusion>,

@@ -41,7 +41,7 @@ impl LensTransfer {
 
     pub(super) fn of_spec(spec: &PointSpreadSpec, sensor_pixel_um: Option<f64>) -> Self {
         let pixel_um = spec.pixel_um.or(sensor_pixel_um).unwrap_or(f64::INFINITY);
-        let [red, green, blue, _] = spec.wavelength_nm.rgbw();
+        let [red, green, blue] = spec.wavelength_nm.rgb();
         let f_number = spec.f_number.unwrap_or(0.0);
         let kernel = spec.kernel.as_ref().and_then(|file| file.kernel.clone());
         Self {

@@ -5,11 +5,15 @@
 use std::sync::Arc;
 
 use camsim_core::{
+    camera::CameraModel,
     mount::CameraPath,
-    pose::BodyState,
+    pose::{BodyState, CameraPose},
     reference::Oracle,
     row_time::WorldPoint,
-    scenario::{Channel, FlightSpec, FlowState, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
+    scenario::{
+        Axis, Channel, FlightSpec, FlowState, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec,
+        VibrationSpec,
+    },
     scene::{
         Encoding, Mesh, RigidMotion, Scene, Texture,
         motion::{Between, Curve, Joint, JointFrame, Keys, Track},
@@ -29,6 +33,15 @@ const FPS: f64 = 30.0;
 
 /// A raft that turns while it drifts below a camera in flight, over a picture that stands still.
 fn sequence() -> Arc<Sequence> {
+    sequence_with([-10.0, 0.0], [50.0, 52.0], &[])
+}
+
+/// The camera begins so far north and east, and vibrates.
+fn sequence_with(
+    [north_m, east_m]: [f64; 2],
+    focal_px: [f64; 2],
+    vibration: &[VibrationSpec],
+) -> Arc<Sequence> {
     // Long because: every part of a sequence is written out.
     let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
     let times_s = vec![-1.0, 1.0];
@@ -74,15 +87,16 @@ fn sequence() -> Arc<Sequence> {
         magnetometer: Vec::new(),
     };
     scenario.camera.size_px = SIZE_PX;
-    scenario.camera.focal_px = [50.0, 52.0];
+    scenario.camera.focal_px = focal_px;
     scenario.camera.fps = FPS;
     scenario.camera.lens =
         LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
-    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
+    scenario.camera.mount =
+        MountSpec { angles_deg: [0.0, -90.0, 0.0], vibration: vibration.to_vec(), ..MountSpec::default() };
     scenario.camera.shutter =
         ShutterSpec { readout_ms: 1e3 * READOUT_S, exposure_ms: 1e3 * EXPOSURE_S, ..ShutterSpec::default() };
     let first = BodyState {
-        position_ned_m: DVec3::new(-10.0, 0.0, -50.0),
+        position_ned_m: DVec3::new(north_m, east_m, -50.0),
         velocity_ned_m_s: DVec3::new(10.0, -2.0, 1.0),
         acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body: DQuat::IDENTITY,
@@ -105,13 +119,12 @@ fn sequence() -> Arc<Sequence> {
 }
 
 /// Mid-exposure of a fractional row of a frame.
-fn row_s(frame: u32, y: f64) -> f64 {
+fn row_s(frame: i32, y: f64) -> f64 {
     f64::from(frame) / FPS + READOUT_S * ((y + 0.5) / f64::from(SIZE_PX[1]) - 0.5)
 }
 
 /// Pixels of frame 1, all valid.
-fn with_pixels(check: impl FnOnce(&FramePixels<'_>, &Oracle)) {
-    let sequence = sequence();
+fn with_pixels(sequence: Arc<Sequence>, check: impl FnOnce(&FramePixels<'_>, &Oracle)) {
     let planner = Planner::new(sequence.clone(), &[Channel::Flow], 16_384).unwrap();
     let plan = planner.plan(1).unwrap();
     let rays = planner.frame_rays(&plan, 0.0);
@@ -134,7 +147,7 @@ fn with_pixels(check: impl FnOnce(&FramePixels<'_>, &Oracle)) {
 
 #[test]
 fn flow_leads_to_where_the_oracle_sees_the_same_place() {
-    with_pixels(|pixels, oracle| {
+    with_pixels(sequence(), |pixels, oracle| {
         for target in [2, 0] {
             let to = pixels.planner.frame_camera(i64::from(target)).unwrap();
             let (mut visible, mut worst_px) = ([0; 3], 0.0_f64);
@@ -164,9 +177,108 @@ fn flow_leads_to_where_the_oracle_sees_the_same_place() {
     });
 }
 
+/// A position at which a frame shows a point, and whether something is in front of it there.
+struct Sight {
+    px: DVec2,
+    is_hidden: bool,
+}
+
+/// All instants of a frame's readout, a fortieth of a row apart, with the row and the camera.
+fn instants(frame: i32, oracle: &Oracle) -> Vec<(f64, f64, CameraPose)> {
+    let rows = (0..=40 * SIZE_PX[1]).map(|k| f64::from(k) / 40.0 - 0.5);
+    rows.map(|y| (y, row_s(frame, y), oracle.sequence().path.pose(row_s(frame, y)))).collect()
+}
+
+/// Where a frame shows a point, by force; `None` where that hangs on less than the grid of instants tells.
+fn shown(
+    point: WorldPoint<'_>,
+    camera: &CameraModel,
+    instants: &[(f64, f64, CameraPose)],
+    oracle: &Oracle,
+) -> Option<Vec<Sight>> {
+    let seen: Vec<Option<(f64, DVec2)>> = instants
+        .iter()
+        .map(|(y, t_s, pose)| camera.show(pose, *t_s, point).map(|(px, _)| (px.y - y, px)))
+        .collect();
+    let is_turn = |three: &[Option<(f64, DVec2)>]| {
+        matches!(three, [Some((a, _)), Some((b, _)), Some((c, _))]
+            if b.abs() < 5e-3 && (b - a) * (c - b) <= 0.0)
+    };
+    if seen.windows(3).any(is_turn) {
+        return None;
+    }
+    let [width, height] = SIZE_PX.map(f64::from);
+    let mut places = Vec::new();
+    for (k, pair) in seen.windows(2).enumerate() {
+        let &[Some((before, a)), Some((after, b))] = pair else { continue };
+        if (before >= 0.0) == (after >= 0.0) {
+            continue;
+        }
+        let px = a.lerp(b, before / (before - after));
+        if px.min_element() < -0.5 || px.x >= width - 0.5 || px.y >= height - 0.5 {
+            continue;
+        }
+        let (_, t_s, pose) = &instants[k];
+        let way = point.position_ned_m(*t_s)? - pose.position_ned_m;
+        let hides = |beside: DVec3| {
+            let hit = oracle.cast_at(*t_s, pose.position_ned_m, way + beside);
+            hit.is_some_and(|hit| hit.depth_m < 0.999)
+        };
+        let is_hidden = hides(DVec3::ZERO);
+        // Near a border the instants between two places of the grid differ.
+        let beside = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y];
+        if beside.into_iter().any(|beside| hides(0.02 * beside) != is_hidden) {
+            return None;
+        }
+        places.push(Sight { px, is_hidden });
+    }
+    Some(places)
+}
+
+#[test]
+fn of_several_places_the_nearest_that_is_seen_counts() {
+    // A long lens over the raft's edge, which shakes so that rows are overtaken again and again.
+    let vibration = [(Axis::Pitch, 60.0), (Axis::Yaw, 55.0)].map(|(axis, hz)| VibrationSpec {
+        axis,
+        amplitude_deg: 2.0,
+        amplitude_m: 0.0,
+        hz,
+        phase_deg: 20.0,
+    });
+    let sequence = sequence_with([-20.0, 0.0], [400.0; 2], &vibration);
+    with_pixels(sequence, |pixels, oracle| {
+        // Before, the raft was over what is beside it now.
+        let target = pixels.planner.frame_camera(-2).unwrap();
+        let instants = instants(-2, oracle);
+        let mut states = [0; 5];
+        for (i, [dx, dy, state]) in flow(pixels, &target).into_iter().enumerate() {
+            let pixel = pixels.pixel(i).unwrap();
+            let from_px = DVec2::from_array(pixel.position.map(f64::from));
+            let point = world_point(pixels, pixel);
+            let Some(mut places) = shown(point, &pixels.plan.camera, &instants, oracle) else { continue };
+            places.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+            let seen: Vec<&Sight> = places.iter().filter(|place| !place.is_hidden).collect();
+            let (expected, place) = match (seen.as_slice(), places.first()) {
+                ([], None) => (FlowState::Outside, None),
+                ([], nearest) => (FlowState::Occluded, nearest),
+                ([only], _) => (FlowState::Visible, Some(*only)),
+                ([nearest, ..], _) => (FlowState::Several, Some(*nearest)),
+            };
+            assert_eq!(state, f32::from(expected as u8), "{from_px}");
+            if let Some(place) = place {
+                let off_px = (from_px + DVec2::new(dx.into(), dy.into())).distance(place.px);
+                assert!(off_px < 0.02, "{from_px}: {off_px:.1e} px");
+            }
+            states[expected as usize] += 1;
+        }
+        let [_, visible, occluded, outside, several] = states;
+        assert!(visible > 200 && occluded > 100 && outside > 50 && several > 200, "{states:?}");
+    });
+}
+
 #[test]
 fn motion_and_blur_are_those_of_the_moved_place() {
-    with_pixels(|pixels, oracle| {
+    with_pixels(sequence(), |pixels, oracle| {
         let (path, camera) = (&oracle.sequence().path, &pixels.plan.camera);
         let mut count = 0;
         for (i, hit) in pixels.hits.iter().enumerate() {
