@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{
     column_names::{KNOWN_NAMES, PREFIXES},
     foreign_formats::{FOREIGN_FORMATS, OTHER_BINARY, OTHER_XML, SUBTITLES},
+    receiver_logs::RECEIVER_LOGS,
     units::{Dimension, UNITS},
 };
 
@@ -226,7 +227,8 @@ pub fn reference() -> String {
     }
     text += "\n## Refused with advice\n\n| file | what to do |\n|---|---|\n";
     let by_signature = FOREIGN_FORMATS.iter().map(|format| (format.name, format.advice));
-    for (name, advice) in by_signature.chain(OTHER_BINARY).chain([SUBTITLES, OTHER_XML]) {
+    for (name, advice) in by_signature.chain(OTHER_BINARY).chain(RECEIVER_LOGS).chain([SUBTITLES, OTHER_XML])
+    {
         let _ = writeln!(text, "| {name} | {advice} |");
     }
     text
