@@ -313,6 +313,17 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
             spec(),
             Refused(&["line 2", "between the names of the columns (line 1)", "no line of units"]),
         ),
+        (
+            "Garmin G1000",
+            flight(
+                "#airframe_info, log_version=\"1.00\", airframe_name=\"X\"\n\
+                 #yyy-mm-dd, hh:mm:ss, hh:mm, ident, degrees, degrees, ft Baro, inch, ft msl, deg, deg, deg\n  \
+                 Lcl Date, Lcl Time, UTCOfst, AtvWpt, Latitude, Longitude, AltB, BaroA, AltMSL, Roll, Pitch, HDG",
+                "2023-05-04, {t}, +02:00, X, {lat}, {lon}, 1, 29.9, {ft}, {rpy}",
+            ),
+            spec(),
+            applied(&["line 2 states the units"]),
+        ),
         // Two lines of names.
         (
             "names twice",
@@ -419,10 +430,25 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
             spec(),
             named(&[]),
         ),
+        (
+            "a list of columns",
+            flight(
+                "# Columns:\n# 1: time (s)\n# 2: latitude (deg)\n# 3: longitude (deg)\n# 4: altitude (ft, MSL)\n# 5-7: roll, pitch, yaw (deg)",
+                feet,
+            ),
+            spec(),
+            applied(&["line 5 states the unit of `height`: ft"]),
+        ),
         // Datums.
         (
             "ellipsoid",
             flight(&format!("# heights above the WGS84 ellipsoid\n{names}"), metres),
+            spec(),
+            named(&["set flight.height = \"ellipsoid\""]),
+        ),
+        (
+            "vertical datum",
+            flight(&format!("# vertical datum = ellipsoid\n{names}"), metres),
             spec(),
             named(&["set flight.height = \"ellipsoid\""]),
         ),

@@ -71,9 +71,14 @@ pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
         advice: "write its rows as CSV with a header line",
     },
     ForeignFormat {
-        name: "a document (PDF)",
-        signatures: &[b"%PDF"],
+        name: "a document (PDF, PostScript, RTF)",
+        signatures: &[b"%PDF", b"%!PS", b"{\\rtf"],
         advice: "flight.log is the file of times and positions",
+    },
+    ForeignFormat {
+        name: "a model (glTF)",
+        signatures: &[b"glTF"],
+        advice: "flight.log is the file of times and positions; models go to scene.gltf",
     },
     ForeignFormat {
         name: "a point cloud (LAS)",

@@ -277,7 +277,7 @@ fn split_suffixes(normal: &str) -> Option<(&'static column_names::KnownName, Str
 }
 
 /// Parses the qualifiers in one pair of brackets; `None` if one is unknown.
-fn parse_qualifiers(text: &str) -> Option<Vec<Qualifier>> {
+pub(super) fn parse_qualifiers(text: &str) -> Option<Vec<Qualifier>> {
     match parse_qualifier(text) {
         Some(qualifier) => Some(vec![qualifier]),
         None => text.split([',', ';', ' ']).filter(|part| !part.is_empty()).map(parse_qualifier).collect(),

@@ -11,10 +11,10 @@ use super::{
     FlightLogError,
     column_meaning::ColumnMeaning,
     column_selection::{has_time_and_position, push_information, push_warning},
-    header::{HeaderColumn, HeaderColumns, ParsedName, dimension, parse_name},
+    header::{HeaderColumn, HeaderColumns, ParsedName, dimension, parse_name, parse_qualifiers},
     missing_columns::missing_columns_message,
     text_table::{HeaderLine, Table, is_missing},
-    units::{Qualifier, parse_qualifier},
+    units::Qualifier,
 };
 
 /// Known names from which on a comment is taken for names of columns, not for prose.
@@ -170,9 +170,15 @@ fn unit_cells<'a>(header: &HeaderColumns, table: &Table<'a>, text: &'a str) -> O
     for (column, cell) in cells.iter().enumerate().filter(|(_, cell)| !is_missing(cell)) {
         let bare = cell.trim_matches(['[', ']', '(', ')', '"', ' ']);
         let wanted = header.parsed(column).map(|parsed| dimension(parsed.meaning));
-        match (parse_qualifier(bare), wanted) {
-            (Some(Qualifier::Unit(unit)), Some(wanted)) if wanted == Some(unit.dimension) => units += 1,
-            (Some(Qualifier::Unit(_)) | None, Some(_)) => others += 1,
+        let unit_of = |qualifiers: Vec<Qualifier>| {
+            qualifiers.into_iter().find_map(|qualifier| match qualifier {
+                Qualifier::Unit(unit) => Some(unit.dimension),
+                _ => None,
+            })
+        };
+        match (parse_qualifiers(bare).map(unit_of), wanted) {
+            (Some(Some(dimension)), Some(wanted)) if wanted == Some(dimension) => units += 1,
+            (Some(Some(_)) | None, Some(_)) => others += 1,
             _ => {}
         }
     }

@@ -210,7 +210,7 @@ pub(super) fn parse_qualifier(text: &str) -> Option<Qualifier> {
     Some(match key.as_str() {
         "msl" | "amsl" | "asl" | "sealevel" | "abovesealevel" | "abovemeansealevel" | "orthometric"
         | "geoid" | "egm96" => Qualifier::Datum(VerticalDatum::MeanSeaLevel),
-        "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "aboveellipsoid" => {
+        "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "wgs" | "aboveellipsoid" => {
             Qualifier::Datum(VerticalDatum::Ellipsoid)
         }
         "magnetic" | "mag" => Qualifier::Magnetic,

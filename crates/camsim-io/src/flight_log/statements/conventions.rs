@@ -220,7 +220,23 @@ fn find(line: &str) -> Vec<Convention> {
         let phrase = format!(" {phrase} ");
         plain.contains(&phrase) || short.contains(&phrase)
     };
-    PHRASES.iter().filter(|(_, phrases)| phrases.iter().any(has)).map(|(convention, _)| *convention).collect()
+    let named = PHRASES.iter().filter(|(_, phrases)| phrases.iter().any(has));
+    let mut found: Vec<Convention> = named.map(|(convention, _)| *convention).collect();
+    // An ellipsoid alone is a part of any geodetic datum; that of heights is a statement.
+    let contains = |list: &[&str]| list.iter().any(|word| words.contains(word));
+    let is_vertical =
+        contains(&["height", "heights", "altitude", "altitudes", "alt", "vertical", "elevation", "h"]);
+    if is_vertical && contains(&["ellipsoid", "ellipsoidal"]) && !found.contains(&Ellipsoid) {
+        found.push(Ellipsoid);
+    }
+    if is_vertical
+        && contains(&["geoid"])
+        && !contains(&["undulation", "separation"])
+        && !found.contains(&MeanSeaLevel)
+    {
+        found.push(MeanSeaLevel);
+    }
+    found
 }
 
 /// Reads quaternions without names in the order that prose states.
