@@ -28,8 +28,7 @@ pub(super) fn unknown_units(header: &HeaderColumns) -> Vec<(ColumnMeaning, Strin
 fn unknown_unit(name: &str) -> Option<(ColumnMeaning, String)> {
     const OTHER_WORDS: &[&str] = &[
         "acc", "bias", "cmd", "cov", "dem", "des", "diff", "err", "lim", "max", "mean", "min", "ok", "rate",
-        "raw", "ref", "rel", "rms", "sd", "set", "sp", "src", "std", "type", "unit", "valid", "var",
-        "vel",
+        "raw", "ref", "rel", "rms", "sd", "set", "sp", "src", "std", "type", "unit", "valid", "var", "vel",
     ];
     let normal = normal_form(name.trim_matches(['"', '\'', ' ']));
     let (stem, word) = normal.rsplit_once('_')?;
