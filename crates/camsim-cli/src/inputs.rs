@@ -225,7 +225,10 @@ pub fn load_flight_only(
 /// Prints the notes of the log's reader that are no warnings.
 fn print_details(scenario: &Scenario, log: &FlightLog, console: &mut Console<'_>) {
     let file = scenario.flight.log.display();
-    console.detail(format_args!("{file}: {}", log.report));
+    // Repairs are a warning, and have been printed.
+    if log.report.is_clean() {
+        console.detail(format_args!("{file}: {}", log.report));
+    }
     for note in log.notes.iter().filter(|note| !note.is_warning) {
         console.detail(format_args!("{file}: {}", note.text));
     }

@@ -35,11 +35,12 @@ use camsim_core::{
         FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow,
     },
     geodesy::Geodetic,
-    scenario::{FlightSpec, LogFormat},
+    scenario::{AttitudeSource, FlightSpec, LogFormat},
 };
 use glam::{DQuat, DVec3};
 
 mod angle_unit;
+mod attitude_check;
 mod attitude_columns;
 mod clock_rollover;
 mod column_meaning;
@@ -52,18 +53,24 @@ mod error;
 mod foreign_formats;
 mod gpx;
 mod header;
+mod header_lines;
 mod height_column;
 mod igc;
 mod kinds;
 mod kml;
 mod layout;
 mod mcap_file;
+mod missing_columns;
+mod preamble;
 mod quaternions;
+mod receiver_logs;
 mod reference;
 mod rows;
 mod scalars;
 mod sparse_rows;
+mod statements;
 mod streams;
+mod tagged_lines;
 mod text_table;
 mod time_fields;
 mod time_unit;
@@ -121,11 +128,25 @@ pub fn read_flight_log(
         FlightLogError::Log { path: path.to_owned(), source }
     })?;
     log.notes = raw.notes;
+    if spec.attitude == AttitudeSource::Log {
+        log.notes.extend(attitude_check::notes(&log, &raw.rows));
+    }
+    without_repetitions(&mut log.notes);
     // Only geodetic positions are known to be in metres; local ones may have any unit of length.
     if raw.rows.iter().any(|row| matches!(row.position, RawPosition::Geodetic(_))) {
         log.notes.extend(jump_note(&log));
     }
     Ok(log)
+}
+
+/// Removes notes that repeat another one, as those of several streams of a file may.
+fn without_repetitions(notes: &mut Vec<Note>) {
+    let all = notes.clone();
+    let mut index = 0;
+    notes.retain(|note| {
+        index += 1;
+        !all[..index - 1].contains(note)
+    });
 }
 
 /// A warning about jumps of the position that are left after cleaning.
@@ -178,9 +199,15 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     }
     let table = text_table::Table::new(content);
     if table.rows.is_empty() {
-        return Err(FlightLogError::Empty { path: path.to_owned() });
+        let lines = table.headers.len();
+        // One comment or two are a file without data, not data behind marks.
+        let only_comments = lines > 2 && table.headers.iter().all(|line| line.is_comment);
+        return Err(match only_comments {
+            true => FlightLogError::OnlyComments { path: path.to_owned(), lines },
+            false => FlightLogError::Empty { path: path.to_owned() },
+        });
     }
-    let mut notes = Vec::new();
+    let mut notes = table.notes.clone();
     notes.extend(unused_keys::unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     let mut rows = rows::read(path, &table, &layout)?;

@@ -32,11 +32,7 @@ pub(super) fn angles_to_degrees(
         }
         return Ok(());
     };
-    let key_factor = match spec.angle_unit {
-        AngleUnit::Auto => None,
-        AngleUnit::Deg => Some(1.0),
-        AngleUnit::Rad => Some(180.0 / std::f64::consts::PI),
-    };
+    let key_factor = unit_of_angle_key(spec.angle_unit);
     let contradicts = |source: &&FieldSource| source.factor.is_some() && source.factor != key_factor;
     if let (Some(_), Some(source)) = (key_factor, sources.iter().find(contradicts)) {
         return Err(format!(
@@ -60,6 +56,15 @@ pub(super) fn angles_to_degrees(
         }
     }
     Ok(())
+}
+
+/// Degrees per unit that `flight.angle_unit` names; `None` for `auto`.
+pub(super) fn unit_of_angle_key(key: AngleUnit) -> Option<f64> {
+    match key {
+        AngleUnit::Auto => None,
+        AngleUnit::Deg => Some(1.0),
+        AngleUnit::Rad => Some(180.0 / std::f64::consts::PI),
+    }
 }
 
 /// Infers degrees per unit of the `unitless` axes (0 roll, 1 pitch, 2 yaw): radians, with a warning, where

@@ -33,6 +33,7 @@ const fn time_name(unit: &'static Unit, names: &'static [&'static str], quantity
 
 /// Prefixes that name the message or device a column comes from.
 pub(super) const PREFIXES: &[&str] = &[
+    "lcl_",
     "osd_",
     "gps_",
     "att_",

@@ -11,11 +11,12 @@ use super::{
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns, format_name},
     header::HeaderColumns,
     height_column::{height_column, is_height},
+    missing_columns::missing_columns_message,
     text_table::{Separator, Table},
     unknown_unit::unknown_units,
 };
 
-fn is_time(meaning: ColumnMeaning) -> bool {
+pub(super) fn is_time(meaning: ColumnMeaning) -> bool {
     matches!(meaning, ColumnMeaning::Time | ColumnMeaning::DateTime | ColumnMeaning::NanosecondsPart)
 }
 
@@ -30,17 +31,6 @@ pub(super) fn has_time_and_position(header: &HeaderColumns) -> bool {
         || (has(X) && has(Y));
     any(&is_time)
         && ((has_horizontal && (any(&is_height) || has(Down) || has(Z))) || any(&|meaning| meaning == Grid))
-}
-
-/// Message for a header without a time or a position.
-pub(super) fn missing_columns_message(header: &HeaderColumns) -> String {
-    let names: Vec<&str> = header.0.iter().map(|column| column.name.as_str()).collect();
-    format!(
-        "the columns `{}` name no time and position; name t and lat, lon, alt, or t and north, east, down \
-            (or alt), or t and x, y, z{}",
-        names.join(", "),
-        unknown_units(header).into_iter().map(|(_, text)| format!("; {text}")).collect::<String>()
-    )
 }
 
 /// Adds a note.

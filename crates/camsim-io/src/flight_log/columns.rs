@@ -44,6 +44,15 @@ pub(super) enum AttitudeColumns {
 }
 
 impl AttitudeColumns {
+    /// Indices of the columns: roll, pitch, yaw, or x, y, z, w.
+    pub(super) fn columns(self) -> Vec<usize> {
+        match self {
+            Self::None => Vec::new(),
+            Self::Euler(sources) => sources.iter().map(|source| source.column).collect(),
+            Self::Quaternion(columns) => columns.to_vec(),
+        }
+    }
+
     /// What the columns hold.
     pub(super) fn kind(self) -> AttitudeKind {
         match self {

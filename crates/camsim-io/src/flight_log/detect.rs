@@ -39,7 +39,8 @@ pub(super) fn detect_format(
         .sample(SAMPLE_ROWS)
         .map(|row| table.fields(row).iter().enumerate().map(|(index, field)| value(index, field)).collect())
         .collect();
-    if table.columns >= 8 && has_quaternions(&sample) {
+    if (table.columns >= 8 && has_quaternions(&sample)) || (table.columns == 8 && lacks_quaternions(&sample))
+    {
         let first_time =
             table.rows.first().and_then(|row| table.number(table.fields(row).first().copied().unwrap_or("")));
         // TUM files have seconds and blanks, EuRoC files nanoseconds and commas. With any other combination
@@ -60,20 +61,29 @@ pub(super) fn detect_format(
     }
 }
 
-/// Whether columns 4 to 7 (from 0) are quaternions: nine rows in ten have norm 1, or they change and have one
-/// common norm.
+/// Whether columns 4 to 7 (from 0) are quaternions: of those that are not 0, nine in ten have norm 1, or they
+/// change and have one common norm.
 fn has_quaternions(sample: &[Vec<f64>]) -> bool {
     let norms: Vec<f64> = sample
         .iter()
         .filter(|row| row.len() >= 8)
         .map(|row| row[4..8].iter().map(|q| q * q).sum::<f64>().sqrt())
+        .filter(|norm| *norm > 0.0)
         .collect();
     let most_near = |norm: f64, tolerance: f64| {
-        norms.iter().filter(|other| (*other / norm - 1.0).abs() < tolerance).count() * 10 >= sample.len() * 9
+        norms.iter().filter(|other| (*other / norm - 1.0).abs() < tolerance).count() * 10 >= norms.len() * 9
+            && !norms.is_empty()
     };
     let changes = || sample.iter().filter(|row| row.len() >= 8).any(|row| row[4..8] != sample[0][4..8]);
-    most_near(1.0, 0.01)
-        || norms.first().is_some_and(|&first| first > 0.0 && most_near(first, 1e-4) && changes())
+    most_near(1.0, 0.01) || norms.first().is_some_and(|&first| most_near(first, 1e-4) && changes())
+}
+
+/// Whether columns 4 to 7 (from 0) are zeros or missing throughout, as of a position without an attitude.
+fn lacks_quaternions(sample: &[Vec<f64>]) -> bool {
+    let is_unknown = |row: &Vec<f64>| {
+        row.get(4..8).is_some_and(|q| q.iter().all(|q| *q == 0.0) || q.iter().all(|q| q.is_nan()))
+    };
+    sample.iter().all(is_unknown)
 }
 
 fn can_be_geodetic(sample: &[Vec<f64>]) -> bool {

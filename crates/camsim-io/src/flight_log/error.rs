@@ -32,6 +32,17 @@ pub enum FlightLogError {
         /// The file.
         path: PathBuf,
     },
+    /// All lines are comments.
+    #[error(
+        "{}: all {lines} lines begin with # or %, so all are comments: remove these marks from the lines of \
+            data", path.display()
+    )]
+    OnlyComments {
+        /// The file.
+        path: PathBuf,
+        /// Number of lines.
+        lines: usize,
+    },
     /// A field is not a number.
     #[error("{}: line {line}, column {column}{name}: `{text}` is not a number{hint}", path.display())]
     NotANumber {

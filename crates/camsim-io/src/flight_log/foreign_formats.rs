@@ -1,5 +1,7 @@
 //! File formats that are not read as a flight log, with the tool that converts each.
 
+use super::receiver_logs;
+
 /// A file format that is refused.
 pub(super) struct ForeignFormat {
     /// Name with its article, as error messages print it.
@@ -69,6 +71,27 @@ pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
         advice: "write its rows as CSV with a header line",
     },
     ForeignFormat {
+        name: "a document (PDF, PostScript, RTF)",
+        signatures: &[b"%PDF", b"%!PS", b"{\\rtf"],
+        advice: "flight.log is the file of times and positions",
+    },
+    ForeignFormat {
+        name: "a model (glTF)",
+        signatures: &[b"glTF"],
+        advice: "flight.log is the file of times and positions; models go to scene.gltf",
+    },
+    ForeignFormat {
+        name: "a point cloud (LAS)",
+        signatures: &[b"LASF"],
+        advice: "flight.log is the file of times and positions of the aircraft",
+    },
+    ForeignFormat {
+        name: "a binary log of a NovAtel or Septentrio receiver",
+        signatures: &[b"\xaa\x44\x12", b"\xaa\x44\x13", b"$@"],
+        advice: "convert it to a table with NovAtel Convert or RxTools (time, latitude, longitude, height, roll, \
+            pitch, azimuth)",
+    },
+    ForeignFormat {
         name: "JSON",
         signatures: &[b"{", b"[{", b"[\n"],
         advice: "write its rows as CSV with a header line",
@@ -130,6 +153,9 @@ pub(super) fn detect(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let has_arrow = second_line.windows(3).any(|window| window == b"-->");
     if first_has_digits_only && has_arrow {
         return Some(SUBTITLES);
+    }
+    if let Some(receiver_log) = receiver_logs::detect(text) {
+        return Some(receiver_log);
     }
     match bytes.get(4..12) {
         Some([b'f', b't', b'y', b'p', ..] | [b'm', b'o', b'o', b'v', ..]) => return Some(VIDEO),

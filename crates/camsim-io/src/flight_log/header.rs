@@ -27,7 +27,7 @@ pub(super) struct ParsedName {
     /// Whether the name is only a unit (`ms`), which may be one part of a time in several columns.
     pub(super) is_bare_unit: bool,
     /// Error message for unknown or contradictory qualifiers, reported if the column is used.
-    problem: Option<String>,
+    pub(super) problem: Option<String>,
 }
 
 /// The columns of a header.
@@ -42,24 +42,6 @@ impl HeaderColumns {
                 .map(|name| HeaderColumn { name: (*name).to_owned(), parsed: parse_name(name, None) })
                 .collect(),
         )
-    }
-
-    /// Parses names with a line of units below them; `None` if that line holds anything else.
-    pub(super) fn parse_with_units(names: &[&str], units: &[&str]) -> Option<Self> {
-        if names.len() != units.len()
-            || !units.iter().all(|text| parse_qualifier(text.trim_matches(['[', ']', '(', ')'])).is_some())
-        {
-            return None;
-        }
-        let columns = names.iter().zip(units);
-        Some(Self(
-            columns
-                .map(|(name, unit)| HeaderColumn {
-                    name: (*name).to_owned(),
-                    parsed: parse_name(name, Some(unit)),
-                })
-                .collect(),
-        ))
     }
 
     pub(super) fn name(&self, column: usize) -> &str {
@@ -158,9 +140,9 @@ pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
 }
 
 /// Parses a name such as `timestamp [ns]`, `lat_deg`, `p_RS_R_x [m]`, `Yaw(rad)`, `lat, deg`, `latE7` or
-/// `TimeUS`; `unit_line` is the cell of a line of units below it.
+/// `TimeUS`; `unit_line` is its cell of a line of units.
 // Long because the rules for qualifiers share the meaning, unit and problem found so far.
-fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
+pub(super) fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     let name = name.trim_matches(['"', '\'', ' ']);
     if let Some(meaning) = px4_quaternion(name) {
         let (stem, unit, is_bare_unit) = ("q".to_owned(), None, false);
@@ -295,7 +277,7 @@ fn split_suffixes(normal: &str) -> Option<(&'static column_names::KnownName, Str
 }
 
 /// Parses the qualifiers in one pair of brackets; `None` if one is unknown.
-fn parse_qualifiers(text: &str) -> Option<Vec<Qualifier>> {
+pub(super) fn parse_qualifiers(text: &str) -> Option<Vec<Qualifier>> {
     match parse_qualifier(text) {
         Some(qualifier) => Some(vec![qualifier]),
         None => text.split([',', ';', ' ']).filter(|part| !part.is_empty()).map(parse_qualifier).collect(),

@@ -7,8 +7,9 @@ use camsim_core::{
 
 use super::{
     column_meaning::ColumnMeaning,
-    column_selection::{missing_columns_message, push_information, push_warning},
+    column_selection::{push_information, push_warning},
     header::HeaderColumns,
+    missing_columns::missing_columns_message,
     units::VerticalDatum,
 };
 

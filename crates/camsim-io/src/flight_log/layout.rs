@@ -11,13 +11,13 @@ use super::{
     FlightLogError,
     attitude_columns::attitude_columns,
     column_meaning::ColumnMeaning,
-    column_selection::{
-        has_time_and_position, missing_columns_message, note_unused_columns, position_columns, time_columns,
-    },
+    column_selection::{note_unused_columns, position_columns, push_warning, time_columns},
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
     detect,
     header::HeaderColumns,
-    text_table::{HeaderLine, Table},
+    header_lines::{HeaderLines, width_message},
+    statements,
+    text_table::Table,
 };
 
 /// The meaning of the columns of a table.
@@ -43,23 +43,68 @@ impl TableLayout {
         notes: &mut Vec<Note>,
     ) -> Result<Self, FlightLogError> {
         detect::refuse_pose_matrices(path, table)?;
-        // The last header before the data counts. Comments that name no columns are skipped.
-        for (index, line) in table.headers.iter().enumerate().rev() {
-            let above = index.checked_sub(1).and_then(|above| table.headers.get(above));
-            let Some(header) = parse_header(path, table, line, above)? else { continue };
-            return Self::from_header(&header, table, spec, notes).map_err(|problem| {
-                FlightLogError::Header { path: path.to_owned(), line: line.number, problem }
-            });
-        }
-        let format = if spec.format == LogFormat::Auto {
-            detect::detect_format(path, table, spec)?
-        } else {
-            spec.format
+        let header_lines = HeaderLines::sort(path, table, spec, notes)?;
+        let mut layout = match (&header_lines.names, &header_lines.misfit) {
+            (Some((line, header)), _) => Self::from_header(header, table, spec, notes)
+                .map_err(|problem| FlightLogError::Header { path: path.to_owned(), line: *line, problem })?,
+            (None, misfit) => {
+                let misfit = misfit.as_ref().map(|(line, names)| (*line, &names[..]));
+                Self::without_names(path, table, spec, misfit, notes)?
+            }
         };
-        Ok(Self::without_header(table, format))
+        statements::apply(&mut layout, table, &header_lines.prose, spec, notes);
+        Ok(layout)
     }
 
-    fn without_header(table: &Table<'_>, format: LogFormat) -> Self {
+    /// The layout of a table without names, by flight.format or by the values. `misfit` are names of a comment
+    /// that are not as many as the columns: those of the first columns must mean the same.
+    fn without_names(
+        path: &Path,
+        table: &Table<'_>,
+        spec: &FlightSpec,
+        misfit: Option<(usize, &[&str])>,
+        notes: &mut Vec<Note>,
+    ) -> Result<Self, FlightLogError> {
+        let detected = match spec.format {
+            LogFormat::Auto => detect::detect_format(path, table, spec),
+            format => Ok(format),
+        };
+        let Some((line, names)) = misfit else {
+            return Ok(Self::without_header(table, detected?, spec));
+        };
+        let first = HeaderColumns::parse(names.get(..table.columns).unwrap_or(&[]));
+        let named = Self::from_header(&first, table, spec, &mut Vec::new());
+        let agrees = |layout: &Self| named.as_ref().is_ok_and(|named| named.has_columns_of(layout));
+        match detected.map(|format| Self::without_header(table, format, spec)) {
+            Ok(layout) if spec.format != LogFormat::Auto || agrees(&layout) => {
+                push_warning(
+                    notes,
+                    format!(
+                        "line {line} names {} columns, but the rows have {}: they are read as {}",
+                        names.len(),
+                        table.columns,
+                        layout.names.join(", ")
+                    ),
+                );
+                Ok(layout)
+            }
+            _ => Err(FlightLogError::Header {
+                path: path.to_owned(),
+                line,
+                problem: width_message(names.len(), table),
+            }),
+        }
+    }
+
+    /// Whether time, position and attitude are in the same columns as those of another layout.
+    fn has_columns_of(&self, other: &Self) -> bool {
+        let columns = |layout: &Self| (layout.time.column, layout.position.map(|source| source.column));
+        self.frame == other.frame
+            && columns(self) == columns(other)
+            && self.attitude.columns() == other.attitude.columns()
+    }
+
+    fn without_header(table: &Table<'_>, format: LogFormat, spec: &FlightSpec) -> Self {
         let (frame, position) = match format {
             LogFormat::CsvXya => (Frame::NorthEastUp, ["north", "east", "altitude"]),
             LogFormat::CsvNed => (Frame::NorthEastDown, ["north", "east", "down"]),
@@ -68,6 +113,7 @@ impl TableLayout {
             _ => (Frame::Geodetic, ["latitude", "longitude", "height"]),
         };
         let (attitude, attitude_names) = match format {
+            _ if spec.attitude == AttitudeSource::Track => (AttitudeColumns::None, &[][..]),
             LogFormat::Tum => (AttitudeColumns::Quaternion([4, 5, 6, 7]), &["qx", "qy", "qz", "qw"][..]),
             LogFormat::Euroc => (AttitudeColumns::Quaternion([5, 6, 7, 4]), &["qw", "qx", "qy", "qz"][..]),
             _ if table.columns >= 7 => (
@@ -145,60 +191,4 @@ impl TableLayout {
             if self.has_header { format!(" (`{name}`)") } else { format!(" ({name})") }
         })
     }
-}
-
-/// Parses a line as a header, or as the line of units below the header `above`; `None` if it is a comment
-/// that names no columns.
-fn parse_header(
-    path: &Path,
-    table: &Table<'_>,
-    line: &HeaderLine<'_>,
-    above: Option<&HeaderLine<'_>>,
-) -> Result<Option<HeaderColumns>, FlightLogError> {
-    let names = table.names(line.text);
-    let with_units = |above: &HeaderLine<'_>| {
-        HeaderColumns::parse_with_units(&table.names(above.text), &names).filter(has_time_and_position)
-    };
-    if let Some(header) = above.and_then(with_units) {
-        return Ok(Some(header));
-    }
-    let problem =
-        |problem: String| FlightLogError::Header { path: path.to_owned(), line: line.number, problem };
-    let mut header = HeaderColumns::parse(&names);
-    let is_complete = table.fits(names.len()) && has_time_and_position(&header);
-    if line.is_comment
-        && !is_complete
-        && let Some(names_only) = header_after_prose(table, line.text)
-    {
-        header = names_only;
-    }
-    if !has_time_and_position(&header) {
-        return if line.is_comment { Ok(None) } else { Err(problem(missing_columns_message(&header))) };
-    }
-    if !table.fits(header.0.len()) {
-        return Err(problem(format!(
-            "it names {} columns, but the rows have {}: give every column one name (a comma within a name \
-                needs quotes, decimal commas need semicolons between the columns)",
-            header.0.len(),
-            table.columns
-        )));
-    }
-    Ok(Some(header))
-}
-
-/// The header at the end of a comment, as in `# format: timestamp tx ty ...` and `# columns are t x y ...`:
-/// the names after a colon or an equals sign, else as many of the last words as the table has columns.
-fn header_after_prose(table: &Table<'_>, text: &str) -> Option<HeaderColumns> {
-    let after_mark = text.match_indices([':', '=']).map(|(mark, _)| &text[mark + 1..]);
-    let mut headers = after_mark.map(|text| HeaderColumns::parse(&table.names(text.trim())));
-    let fits = |header: &HeaderColumns| table.fits(header.0.len()) && has_time_and_position(header);
-    headers.find(fits).or_else(|| {
-        let names = table.names(text);
-        let prose_words = names.len().checked_sub(table.columns)?;
-        let is_prose = names
-            .get(..prose_words)?
-            .iter()
-            .all(|word| HeaderColumns::parse(&[word]).0.iter().all(|column| column.parsed.is_none()));
-        is_prose.then(|| HeaderColumns::parse(&names[prose_words..])).filter(fits)
-    })
 }

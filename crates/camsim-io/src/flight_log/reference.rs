@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{
     column_names::{KNOWN_NAMES, PREFIXES},
     foreign_formats::{FOREIGN_FORMATS, OTHER_BINARY, OTHER_XML, SUBTITLES},
+    receiver_logs::RECEIVER_LOGS,
     units::{Dimension, UNITS},
 };
 
@@ -91,8 +92,25 @@ const RULES: &[(&str, &str)] = &[
     (
         "Units in a header",
         "in brackets `[]` or `()`, behind a comma (`\"lat, deg\"`), as the end of the name (`alt_ft`, \
-            `TimeUS`, `latE7`), or as a line of units below the names. An unknown unit of a column that is \
-            used is refused",
+            `TimeUS`, `latE7`), or as a line of units above or below the names, also as a comment. An unknown \
+            unit of a column that is used is refused",
+    ),
+    (
+        "Two lines of names",
+        "the last counts, and the other one adds names, units and datums to it; a contradiction is refused",
+    ),
+    (
+        "Prose",
+        "comments above, among and below the rows, and lines before the names. A unit that plainly belongs to a \
+            quantity (`# heights in feet`, `Altitude unit,feet`, `# units: radians`) is applied where the header \
+            names none, and so is the order of quaternions without names (`# scalar first`). Other statements \
+            about what is read that differ from how it is read (units in doubt, datums, axes, magnetic north) \
+            give one warning",
+    ),
+    (
+        "Tags (FlySight 2)",
+        "`$COL,GNSS,...` names the columns of the rows `$GNSS,...`, `$UNIT,GNSS,...` their units; of several tags \
+            the one with a time and a position is read",
     ),
     (
         "Several columns for one quantity",
@@ -109,7 +127,8 @@ const RULES: &[(&str, &str)] = &[
     (
         "Number of columns",
         "a header names as many as the rows have, and no row has more. The end of a comment counts where \
-            prose stands before the names (`# format: timestamp tx ty ...`)",
+            prose stands before the names (`# format: timestamp tx ty ...`). A comment that names another number \
+            gives a warning where flight.format or the values tell the layout",
     ),
     (
         "Times",
@@ -167,6 +186,12 @@ const RULES: &[(&str, &str)] = &[
             invalid are left out and counted",
     ),
     ("Equal times", "refused where all times are equal and the positions are not"),
+    (
+        "Attitudes",
+        "a warning where the body is upside down in all rows, or upright only in another order of the \
+            quaternions; and where all rows have one attitude though the path turns. TUM rows with zeros for \
+            quaternions state none",
+    ),
     (
         "Jumps",
         "a flight that goes on at more than 1000 m/s between two rows after all repairs gives a warning with \
@@ -226,7 +251,8 @@ pub fn reference() -> String {
     }
     text += "\n## Refused with advice\n\n| file | what to do |\n|---|---|\n";
     let by_signature = FOREIGN_FORMATS.iter().map(|format| (format.name, format.advice));
-    for (name, advice) in by_signature.chain(OTHER_BINARY).chain([SUBTITLES, OTHER_XML]) {
+    for (name, advice) in by_signature.chain(OTHER_BINARY).chain(RECEIVER_LOGS).chain([SUBTITLES, OTHER_XML])
+    {
         let _ = writeln!(text, "| {name} | {advice} |");
     }
     text

@@ -269,6 +269,9 @@ impl<'a> RowFields<'a, '_> {
             if value.is_finite() && value.abs() > limit {
                 let advice = if value.abs() > 1e5 && source.factor.is_none() && value.fract() == 0.0 {
                     "are these 1e-7 degrees? Then name the columns lat_e7 and lon_e7"
+                } else if are_degrees_and_minutes([latitude, longitude]) {
+                    "are these degrees and minutes (ddmm.mmmm, as in NMEA: 4703.0 is 47 degrees and 3 minutes, \
+                        47.05)? Then write degrees with decimals"
                 } else {
                     "are these metres? Then set flight.format = \"csv-xya\" or \"csv-ned\""
                 };
@@ -282,6 +285,15 @@ impl<'a> RowFields<'a, '_> {
         }
         Ok(())
     }
+}
+
+/// Whether a latitude and a longitude may be degrees and minutes written as one number.
+fn are_degrees_and_minutes(position: [f64; 2]) -> bool {
+    let limits = [90.0, 180.0];
+    position
+        .into_iter()
+        .zip(limits)
+        .all(|(value, limit)| (value.abs() / 100.0).trunc() <= limit && value.abs() % 100.0 < 60.0)
 }
 
 /// Advice for a field that is no number, by its appearance.

@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::time_fields;
+use camsim_core::flight_log::Note;
+
+use super::{preamble, tagged_lines, time_fields};
 
 /// Lines that are sampled to detect the separator.
 const SAMPLE_LINES: usize = 32;
+/// Comments among and below the data that are looked at.
+const MAX_LATER_COMMENTS: usize = 100;
 
 /// Separator of fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,7 +122,8 @@ pub(super) struct HeaderLine<'a> {
     pub(super) number: usize,
     /// Text without the mark of a comment.
     pub(super) text: &'a str,
-    /// Whether it is a comment, which may be prose. Any other line must be a header, or units below one.
+    /// Whether it may be prose: a comment, or a line of a preamble. Any other line below the names must state
+    /// units.
     pub(super) is_comment: bool,
 }
 
@@ -127,6 +132,10 @@ pub(super) struct HeaderLine<'a> {
 pub(super) struct Table<'a> {
     /// Lines before the data that may name columns, in the file's order.
     pub(super) headers: Vec<HeaderLine<'a>>,
+    /// Comments among and below the data.
+    pub(super) later_comments: Vec<HeaderLine<'a>>,
+    /// Notes about lines that are not read.
+    pub(super) notes: Vec<Note>,
     /// Lines of data, in the file's order.
     pub(super) rows: Vec<Line<'a>>,
     /// Separator of fields.
@@ -153,6 +162,7 @@ impl<'a> Table<'a> {
             .map(|(index, text)| Line { number: index + 1, text: text.trim_matches([' ', '\r']) })
             .filter(|line| !line.text.trim().is_empty())
             .collect();
+        let (lines, tagged_headers, notes) = tagged_lines::untag(lines);
         let is_comment = |line: &Line<'_>| line.text.starts_with(['#', '%']);
         let body: Vec<&str> = lines.iter().filter(|line| !is_comment(line)).map(|line| line.text).collect();
         let sample: Vec<&str> =
@@ -161,20 +171,35 @@ impl<'a> Table<'a> {
         let last = body.last().into_iter().copied();
         let separator = Separator::detect(&sample.into_iter().chain(last).collect::<Vec<_>>());
 
-        let mut headers = Vec::new();
+        let mut headers = tagged_headers;
+        let mut later_comments = Vec::new();
         let mut rows = Vec::new();
         let mut fields = Vec::new();
-        for line in lines {
+        let preamble_lines = preamble::length(&lines, separator);
+        for (index, line) in lines.into_iter().enumerate() {
             let line_is_comment = is_comment(&line);
-            if rows.is_empty() && (line_is_comment || is_header(line.text, separator, &mut fields)) {
-                let text =
-                    if line_is_comment { line.text.trim_start_matches(['#', '%']).trim() } else { line.text };
-                headers.push(HeaderLine { number: line.number, text, is_comment: line_is_comment });
+            let text =
+                if line_is_comment { line.text.trim_start_matches(['#', '%']).trim() } else { line.text };
+            let is_prose = line_is_comment || index < preamble_lines;
+            let header = HeaderLine { number: line.number, text, is_comment: is_prose };
+            if rows.is_empty() && (is_prose || is_header(line.text, separator, &mut fields)) {
+                headers.push(header);
             } else if !line_is_comment {
                 rows.push(line);
+            } else if later_comments.len() < MAX_LATER_COMMENTS {
+                later_comments.push(header);
             }
         }
-        let mut table = Self { headers, rows, separator, has_decimal_commas: false, columns: 0, width: 0 };
+        let mut table = Self {
+            headers,
+            later_comments,
+            notes,
+            rows,
+            separator,
+            has_decimal_commas: false,
+            columns: 0,
+            width: 0,
+        };
         let (mut commas, mut points) = (0, 0);
         // For each number of fields: the number of rows, and of columns up to the last that is not empty.
         let mut widths: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
@@ -228,6 +253,19 @@ impl<'a> Table<'a> {
         others.map(split).find(|names| self.fits(names.len())).unwrap_or(first)
     }
 
+    /// The fields of a line that has one for each of `count` columns, by the separator of the rows or by
+    /// another one. Empty ones at the end may be missing.
+    pub(super) fn cells(&self, text: &'a str, count: usize) -> Option<Vec<&'a str>> {
+        let mut fields = Vec::new();
+        [self.separator].into_iter().chain(Separator::ALL).find_map(|separator| {
+            separator.split(text, &mut fields);
+            let filled = without_trailing_empty(&fields).len();
+            let is_short = separator == Separator::Space && fields.len() < count;
+            let fits = (2..=count).contains(&filled) && !is_short;
+            fits.then(|| fields.iter().copied().chain(std::iter::repeat("")).take(count).collect())
+        })
+    }
+
     /// Whether the number of names matches the number of columns.
     pub(super) fn fits(&self, names: usize) -> bool {
         (self.columns..=self.width).contains(&names)
@@ -268,7 +306,7 @@ fn without_trailing_empty<'a>(names: &[&'a str]) -> Vec<&'a str> {
 }
 
 /// Whether a line has words, and neither numbers nor times.
-fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>) -> bool {
+pub(super) fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>) -> bool {
     separator.split(line, fields);
     let is_word = |field: &str| !is_missing(field) && !is_value(field, separator != Separator::Comma);
     fields.iter().any(|field| is_word(field))
@@ -276,7 +314,7 @@ fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>)
 }
 
 /// Whether a field is a number or a time, and not missing.
-fn is_value(field: &str, may_have_decimal_comma: bool) -> bool {
+pub(super) fn is_value(field: &str, may_have_decimal_comma: bool) -> bool {
     !is_missing(field)
         && (number(field, false).is_some()
             || (may_have_decimal_comma && number(field, true).is_some())

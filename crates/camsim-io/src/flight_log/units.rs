@@ -210,7 +210,7 @@ pub(super) fn parse_qualifier(text: &str) -> Option<Qualifier> {
     Some(match key.as_str() {
         "msl" | "amsl" | "asl" | "sealevel" | "abovesealevel" | "abovemeansealevel" | "orthometric"
         | "geoid" | "egm96" => Qualifier::Datum(VerticalDatum::MeanSeaLevel),
-        "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "aboveellipsoid" => {
+        "ellipsoid" | "ellipsoidal" | "hae" | "wgs84" | "wgs" | "aboveellipsoid" => {
             Qualifier::Datum(VerticalDatum::Ellipsoid)
         }
         "magnetic" | "mag" => Qualifier::Magnetic,
@@ -218,8 +218,17 @@ pub(super) fn parse_qualifier(text: &str) -> Option<Qualifier> {
         | "360" | "180" | "180180" | "180to180" | "0to360" | "frd" | "body" | "decimal" | "dd" => {
             Qualifier::Ignored
         }
+        pattern if is_time_pattern(pattern) => Qualifier::Ignored,
         _ => return None,
     })
+}
+
+/// Whether a text describes how dates or clock times are written, as `yyyy-mm-dd` or `hh:mm:ss`.
+fn is_time_pattern(key: &str) -> bool {
+    let has = |part: &str| key.contains(part);
+    matches!(key, "iso" | "iso8601")
+        || ((has("yy") && has("mm") && has("dd")) || (has("hh") && has("mm") && has("ss")))
+            && key.chars().all(|c| "ymdhsftz:/,".contains(c))
 }
 
 #[cfg(test)]

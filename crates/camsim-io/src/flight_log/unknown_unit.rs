@@ -28,13 +28,12 @@ pub(super) fn unknown_units(header: &HeaderColumns) -> Vec<(ColumnMeaning, Strin
 fn unknown_unit(name: &str) -> Option<(ColumnMeaning, String)> {
     const OTHER_WORDS: &[&str] = &[
         "acc", "bias", "cmd", "cov", "dem", "des", "diff", "err", "lim", "max", "mean", "min", "ok", "rate",
-        "raw", "ref", "rel", "rms", "sd", "set", "sp", "src", "std", "type", "unit", "v", "valid", "var",
-        "vel",
+        "raw", "ref", "rel", "rms", "sd", "set", "sp", "src", "std", "type", "unit", "valid", "var", "vel",
     ];
     let normal = normal_form(name.trim_matches(['"', '\'', ' ']));
     let (stem, word) = normal.rsplit_once('_')?;
     let meaning = column_names::find(stem).map(|known| known.meaning)?;
-    let looks_like_unit = (1..=4).contains(&word.len())
+    let looks_like_unit = (2..=4).contains(&word.len())
         && word.chars().all(char::is_alphabetic)
         && !OTHER_WORDS.contains(&word)
         && parse_qualifier(word).is_none();

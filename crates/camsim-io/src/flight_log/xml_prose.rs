@@ -4,7 +4,7 @@ use camsim_core::flight_log::Note;
 use roxmltree::{Document, Node};
 
 /// Datums other than WGS 84, by letters and digits alone. Maps of China shift positions on purpose (GCJ-02).
-const DATUMS: [&str; 15] = [
+pub(super) const DATUMS: [&str; 15] = [
     "ED50",
     "NAD27",
     "TOKYODATUM",

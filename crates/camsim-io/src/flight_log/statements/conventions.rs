@@ -1,0 +1,368 @@
+//! Conventions in prose: what heights are above, where axes point, how quaternions are written.
+
+use camsim_core::{
+    flight_log::Note,
+    scenario::{FlightSpec, HeightReference},
+};
+
+use super::{
+    super::{
+        column_meaning::ColumnMeaning,
+        column_selection::push_information,
+        columns::{AttitudeColumns, AttitudeKind, Frame},
+        layout::TableLayout,
+        text_table::HeaderLine,
+        units::VerticalDatum,
+        xml_prose::DATUMS,
+    },
+    Doubt, meaning_of,
+};
+
+/// A convention that prose may name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Convention {
+    MeanSeaLevel,
+    Ellipsoid,
+    AboveGround,
+    AirPressure,
+    NorthEastDown,
+    EastNorthUp,
+    OtherWorld,
+    ForwardRightDown,
+    ForwardLeftUp,
+    OtherBody,
+    ScalarFirst,
+    ScalarLast,
+    WorldToBody,
+    MagneticNorth,
+    CounterClockwise,
+    LeftHanded,
+    VerticalY,
+    ZUp,
+    ZDown,
+    XNorth,
+    XEast,
+    Imperial,
+}
+
+use Convention::*;
+
+/// Phrases, as words of letters and digits, with what they name.
+const PHRASES: &[(Convention, &[&str])] = &[
+    (
+        MeanSeaLevel,
+        &[
+            "msl",
+            "amsl",
+            "asl",
+            "sea level",
+            "orthometric",
+            "above geoid",
+            "above the geoid",
+            "egm96",
+            "egm2008",
+            "navd88",
+        ],
+    ),
+    (
+        Ellipsoid,
+        &[
+            "hae",
+            "ellipsoidal height",
+            "ellipsoidal heights",
+            "ellipsoid height",
+            "ellipsoid heights",
+            "above ellipsoid",
+            "above the ellipsoid",
+            "above wgs84",
+            "above wgs 84",
+            "above the wgs84",
+            "above the wgs 84",
+            "height wgs84 ellipsoid",
+            "heights ellipsoidal",
+            "height ellipsoidal",
+        ],
+    ),
+    (
+        AboveGround,
+        &[
+            "agl",
+            "above ground",
+            "above takeoff",
+            "above take off",
+            "above home",
+            "relative to home",
+            "relative to takeoff",
+            "relative to take off",
+            "relative to ground",
+            "above launch",
+        ],
+    ),
+    (
+        AirPressure,
+        &[
+            "pressure altitude",
+            "pressure altitudes",
+            "barometric altitude",
+            "barometric altitudes",
+            "barometric height",
+            "barometric heights",
+            "flight levels",
+            "qnh",
+            "qfe",
+            "qne",
+        ],
+    ),
+    (NorthEastDown, &["ned", "north east down"]),
+    (EastNorthUp, &["enu", "east north up"]),
+    (OtherWorld, &["nwu", "north west up", "ecef", "eun", "esu", "wnd", "earth centred", "earth centered"]),
+    (ForwardRightDown, &["frd", "forward right down", "front right down", "fwd right down"]),
+    (ForwardLeftUp, &["flu", "forward left up", "front left up", "fwd left up"]),
+    (OtherBody, &["rdf", "right down forward", "optical frame", "camera frame", "rub", "opengl", "opencv"]),
+    (ScalarFirst, &["wxyz", "w x y z", "qw qx qy qz", "w first", "scalar first", "real part first"]),
+    (ScalarLast, &["xyzw", "x y z w", "qx qy qz qw", "w last", "scalar last", "real part last"]),
+    (
+        WorldToBody,
+        &[
+            "world to body",
+            "world to camera",
+            "world to cam",
+            "w2c",
+            "w2b",
+            "body from world",
+            "camera from world",
+            "global to body",
+            "ned to body",
+            "enu to body",
+            "map to body",
+        ],
+    ),
+    (MagneticNorth, &["magnetic"]),
+    (
+        CounterClockwise,
+        &[
+            "counter clockwise",
+            "counterclockwise",
+            "anticlockwise",
+            "anti clockwise",
+            "ccw",
+            "yaw from east",
+            "heading from east",
+        ],
+    ),
+    (LeftHanded, &["left handed", "left hand"]),
+    (VerticalY, &["y up", "y down", "y vertical"]),
+    (ZUp, &["z up", "z upward", "z upwards"]),
+    (ZDown, &["z down", "z downward", "z downwards"]),
+    (XNorth, &["x north"]),
+    (XEast, &["x east"]),
+    (Imperial, &["imperial", "us customary"]),
+];
+
+/// Applies the order of quaternions. Returns the statements that differ from how the table is read.
+pub(super) fn apply(
+    layout: &mut TableLayout,
+    lines: &[HeaderLine<'_>],
+    spec: &FlightSpec,
+    notes: &mut Vec<Note>,
+) -> Vec<Doubt> {
+    let named: Vec<(Convention, &HeaderLine<'_>)> =
+        lines.iter().flat_map(|line| find(line.text).into_iter().map(move |found| (found, line))).collect();
+    let names = |convention: Convention| named.iter().any(|(other, _)| *other == convention);
+    let orders = (names(ScalarFirst), names(ScalarLast));
+    if orders.0 != orders.1
+        && let Some(line) = named.iter().find(|(found, _)| matches!(found, ScalarFirst | ScalarLast))
+    {
+        apply_order(layout, orders.0, line.1.number, notes);
+    }
+    let mut doubts: Vec<Doubt> = named
+        .iter()
+        .filter_map(|(convention, line)| Some(Doubt::new(line, difference(*convention, layout, spec)?)))
+        .collect();
+    doubts.extend(lines.iter().filter_map(|line| other_datum(line, layout)));
+    doubts
+}
+
+/// The conventions that a line names.
+fn find(line: &str) -> Vec<Convention> {
+    const FILLERS: [&str; 11] =
+        ["is", "are", "axis", "axes", "points", "pointing", "to", "positive", "towards", "the", "as"];
+    let lower = line.to_lowercase();
+    let words: Vec<&str> =
+        lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    let joined = |words: &[&str]| format!(" {} ", words.join(" "));
+    let plain = joined(&words);
+    let short: Vec<&str> = words.iter().copied().filter(|word| !FILLERS.contains(word)).collect();
+    let short = joined(&short);
+    // `velocity in ENU` does not concern positions.
+    let is_of_motion = ["velocity", "velocities", "vel", "speed", "acceleration", "accelerations", "gyro"]
+        .iter()
+        .any(|word| words.contains(word))
+        && ![
+            "position",
+            "positions",
+            "attitude",
+            "orientation",
+            "pose",
+            "poses",
+            "quaternion",
+            "height",
+            "heights",
+            "altitude",
+            "altitudes",
+        ]
+        .iter()
+        .any(|word| words.contains(word));
+    if is_of_motion {
+        return Vec::new();
+    }
+    let has = |phrase: &&str| {
+        let phrase = format!(" {phrase} ");
+        plain.contains(&phrase) || short.contains(&phrase)
+    };
+    let named = PHRASES.iter().filter(|(_, phrases)| phrases.iter().any(has));
+    let mut found: Vec<Convention> = named.map(|(convention, _)| *convention).collect();
+    // An ellipsoid alone is a part of any geodetic datum; that of heights is a statement.
+    let contains = |list: &[&str]| list.iter().any(|word| words.contains(word));
+    let is_vertical =
+        contains(&["height", "heights", "altitude", "altitudes", "alt", "vertical", "elevation", "h"]);
+    if is_vertical && contains(&["ellipsoid", "ellipsoidal"]) && !found.contains(&Ellipsoid) {
+        found.push(Ellipsoid);
+    }
+    if is_vertical
+        && contains(&["geoid"])
+        && !contains(&["undulation", "separation"])
+        && !found.contains(&MeanSeaLevel)
+    {
+        found.push(MeanSeaLevel);
+    }
+    found
+}
+
+/// Reads quaternions without names in the order that prose states.
+fn apply_order(layout: &mut TableLayout, is_scalar_first: bool, line: usize, notes: &mut Vec<Note>) {
+    let AttitudeColumns::Quaternion(columns) = &mut layout.attitude else { return };
+    let ordered = if is_scalar_first { [5, 6, 7, 4] } else { [4, 5, 6, 7] };
+    if layout.has_header || *columns == ordered {
+        return;
+    }
+    *columns = ordered;
+    let names = if is_scalar_first { ["qw", "qx", "qy", "qz"] } else { ["qx", "qy", "qz", "qw"] };
+    for (name, order) in layout.names.iter_mut().skip(4).zip(names) {
+        order.clone_into(name);
+    }
+    push_information(notes, format!("line {line} states the order of the quaternions: {}", names.join(", ")));
+}
+
+/// How the table is read, and what to do, where that differs from a convention; `None` where it agrees or the
+/// convention concerns nothing that is read.
+// Long because it is one table of cases.
+fn difference(convention: Convention, layout: &TableLayout, spec: &FlightSpec) -> Option<String> {
+    let is_geodetic = layout.frame == Frame::Geodetic;
+    let kind = layout.attitude.kind();
+    let has_attitude = kind != AttitudeKind::None;
+    let is_local = !is_geodetic;
+    let up = match layout.frame {
+        Frame::NorthEastDown => "down",
+        _ => "up",
+    };
+    let axes = match layout.frame {
+        Frame::Geodetic => "attitudes are read as turning a forward-right-down body to north-east-down",
+        Frame::NorthEastUp => "positions are read as north, east, up",
+        Frame::NorthEastDown => "positions are read as north, east, down, bodies as forward-right-down",
+        Frame::EastNorthUp => "positions are read as x east, y north, z up, bodies as forward-left-up",
+    };
+    let fix = "convert them, or name the columns or set flight.format to say so";
+    let world = |agrees: bool| (!agrees).then(|| format!("{axes}: {fix}"));
+    let height = meaning_of(layout, layout.position[2].column);
+    let datum = |stated: VerticalDatum| {
+        if !is_geodetic {
+            return None;
+        }
+        let key = match spec.height {
+            HeightReference::Msl => VerticalDatum::MeanSeaLevel,
+            HeightReference::Ellipsoid => VerticalDatum::Ellipsoid,
+        };
+        let name = |datum| if datum == VerticalDatum::Ellipsoid { "ellipsoid" } else { "msl" };
+        let named = match height {
+            Some(ColumnMeaning::Height(datum)) => datum,
+            _ => None,
+        };
+        match named {
+            Some(named) if named != stated => {
+                Some("the name of the column says otherwise, and counts".to_owned())
+            }
+            // The names are compared with the key where the column is chosen.
+            Some(_) => None,
+            None if stated == key => None,
+            None => Some(format!(
+                "flight.height says \"{}\": set flight.height = \"{}\" if the line is about the heights",
+                name(key),
+                name(stated)
+            )),
+        }
+    };
+    match convention {
+        MeanSeaLevel => datum(VerticalDatum::MeanSeaLevel),
+        Ellipsoid => datum(VerticalDatum::Ellipsoid),
+        AboveGround => is_geodetic.then(|| {
+            "heights are read as above what flight.height says: add the height of the ground".to_owned()
+        }),
+        AirPressure => (is_geodetic && height != Some(ColumnMeaning::PressureHeight)).then(|| {
+            "heights are read as true ones: those by air pressure may be off by 100 m and more".to_owned()
+        }),
+        NorthEastDown => world(match layout.frame {
+            Frame::NorthEastDown | Frame::Geodetic => true,
+            Frame::NorthEastUp | Frame::EastNorthUp => false,
+        }),
+        EastNorthUp => world(layout.frame == Frame::EastNorthUp || (is_geodetic && !has_attitude)),
+        OtherWorld => world(is_geodetic && !has_attitude),
+        ForwardRightDown => world(!has_attitude || layout.frame != Frame::EastNorthUp),
+        ForwardLeftUp => world(!has_attitude || layout.frame == Frame::EastNorthUp),
+        OtherBody => has_attitude.then(|| format!("{axes}: camera.mount turns the camera in that body")),
+        ScalarFirst | ScalarLast => {
+            let AttitudeColumns::Quaternion([x, _, _, w]) = layout.attitude else { return None };
+            ((w < x) != (convention == ScalarFirst)).then(|| "the names say otherwise, and count".to_owned())
+        }
+        WorldToBody => (kind == AttitudeKind::Quaternion).then(|| {
+            "quaternions are read as turning the body to the world: invert them if it is so".to_owned()
+        }),
+        MagneticNorth => (kind == AttitudeKind::Euler && !has_magnetic_yaw(layout))
+            .then(|| "yaw is read as from true north: add the declination".to_owned()),
+        CounterClockwise => (kind == AttitudeKind::Euler)
+            .then(|| "yaw is read as from north, clockwise: convert it".to_owned()),
+        LeftHanded => (is_local || has_attitude).then(|| format!("{axes}: {fix}")),
+        VerticalY => is_local.then(|| format!("{axes}: {fix}")),
+        ZUp => (is_local && up == "down").then(|| format!("{axes}: {fix}")),
+        ZDown => (is_local && up == "up").then(|| format!("{axes}: {fix}")),
+        XNorth => (layout.frame == Frame::EastNorthUp).then(|| format!("{axes}: {fix}")),
+        XEast => matches!(layout.frame, Frame::NorthEastUp | Frame::NorthEastDown)
+            .then(|| format!("{axes}: {fix}")),
+        Imperial => layout.position[2]
+            .factor
+            .is_none()
+            .then(|| "heights are read as metres: name units in the header, as `alt_ft`".to_owned()),
+    }
+}
+
+/// Whether the name of the yaw says that it is from magnetic north, of which the header's reader warns.
+fn has_magnetic_yaw(layout: &TableLayout) -> bool {
+    let AttitudeColumns::Euler([_, _, yaw]) = layout.attitude else { return false };
+    meaning_of(layout, yaw.column) == Some(ColumnMeaning::MagneticYaw)
+}
+
+/// A horizontal datum other than WGS 84.
+fn other_datum(line: &HeaderLine<'_>, layout: &TableLayout) -> Option<Doubt> {
+    let words: Vec<String> = line
+        .text
+        .split_whitespace()
+        .map(|word| word.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_uppercase())
+        .collect();
+    let is_named = |datum: &&&str| {
+        words.iter().any(|word| word == **datum) || words.windows(2).any(|pair| pair.concat() == ***datum)
+    };
+    let datum = DATUMS.iter().find(is_named)?;
+    (layout.frame == Frame::Geodetic).then(|| {
+        Doubt::new(line, format!("positions are taken as WGS 84: convert them if they are of {datum}"))
+    })
+}

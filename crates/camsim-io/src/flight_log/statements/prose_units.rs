@@ -1,0 +1,405 @@
+//! Units in prose, with the quantities that they belong to: `heights in feet, angles in radians`.
+
+use super::{
+    super::{
+        columns::Frame,
+        units::{Dimension, Qualifier, Unit, parse_qualifier},
+    },
+    Target,
+};
+
+/// Units that a line of prose states.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Found {
+    /// Units with what they belong to; with nothing, to the whole table.
+    pub(super) plain: Vec<(Vec<Target>, &'static Unit)>,
+    /// A unit other than metres, degrees and seconds that may belong to what is read.
+    pub(super) doubtful: Option<&'static Unit>,
+}
+
+/// Words that make a sentence one about something else than how the table's numbers are.
+const HEDGES: &[&str] = &[
+    "not",
+    "no",
+    "never",
+    "converted",
+    "instead",
+    "was",
+    "were",
+    "formerly",
+    "originally",
+    "except",
+    "unless",
+    "if",
+    "or",
+    "might",
+    "should",
+];
+/// Words behind which a unit stands.
+const LINKS: &[&str] =
+    &["in", "is", "are", "unit", "units", "as", "decimal", "and", "use", "uses", "using", "given"];
+/// Quantities that are not read, and words that make another quantity of the one beside them (`antenna
+/// height`, `time offset`); their units do not matter.
+const OTHERS: &[&str] = &[
+    "speed",
+    "speeds",
+    "velocity",
+    "velocities",
+    "vel",
+    "groundspeed",
+    "airspeed",
+    "accuracy",
+    "accuracies",
+    "precision",
+    "deviation",
+    "std",
+    "sigma",
+    "covariance",
+    "error",
+    "errors",
+    "noise",
+    "wind",
+    "distance",
+    "distances",
+    "range",
+    "acceleration",
+    "accelerations",
+    "acc",
+    "accel",
+    "gyro",
+    "gyroscope",
+    "imu",
+    "gravity",
+    "temperature",
+    "rate",
+    "rates",
+    "climb",
+    "sink",
+    "vario",
+    "battery",
+    "voltage",
+    "mass",
+    "weight",
+    "focal",
+    "pixel",
+    "pixels",
+    "lens",
+    "baseline",
+    "antenna",
+    "lever",
+    "offset",
+    "wingspan",
+    "gimbal",
+    "camera",
+    "declination",
+    "variation",
+    "magnetometer",
+    "undulation",
+    "separation",
+    "radius",
+    "runway",
+    "airport",
+    "step",
+    "interval",
+    "period",
+    "delay",
+    "latency",
+    "duration",
+    "exposure",
+    "resolution",
+    "window",
+    "tolerance",
+    "threshold",
+    "home",
+    "takeoff",
+    "ground",
+    "terrain",
+    "geoid",
+    "max",
+    "maximum",
+    "min",
+    "minimum",
+    "mean",
+    "average",
+    "initial",
+    "start",
+    "target",
+    "cruise",
+    "zone",
+];
+/// Units of such quantities.
+const OTHER_UNITS: &[&str] =
+    &["knots", "knot", "kt", "kts", "kn", "mph", "kmh", "kph", "hpa", "mbar", "celsius"];
+
+/// One word of a line, or a slash between two.
+struct Word<'a> {
+    text: &'a str,
+    /// Whether a bracket, a colon or an equals sign stands before it.
+    is_marked: bool,
+    /// Whether a sentence ends before it.
+    begins_sentence: bool,
+    /// Whether only blanks stand between it and the word before.
+    is_adjacent: bool,
+}
+
+fn words(lower: &str) -> Vec<Word<'_>> {
+    let is_part = |c: char| c.is_alphanumeric() || matches!(c, '°' | '^');
+    let mut words = Vec::new();
+    let (mut is_marked, mut begins_sentence, mut is_adjacent) = (false, true, false);
+    let mut rest = lower;
+    while let Some(first) = rest.chars().next() {
+        // Numbers keep their sign, point and exponent.
+        let is_number = first.is_ascii_digit();
+        let end = if is_part(first) {
+            let is_in_number = |c: char| is_part(c) || matches!(c, '.' | '-' | '+');
+            rest.find(|c: char| if is_number { !is_in_number(c) } else { !is_part(c) }).unwrap_or(rest.len())
+        } else {
+            first.len_utf8()
+        };
+        let (text, after) = rest.split_at(end);
+        if is_part(first) || first == '/' {
+            words.push(Word { text: text.trim_end_matches('.'), is_marked, begins_sentence, is_adjacent });
+            (is_marked, begins_sentence, is_adjacent) = (false, false, true);
+        } else if !matches!(first, ' ' | '_' | '-') {
+            is_adjacent = false;
+        }
+        if matches!(first, '[' | '(' | '{' | ':' | '=') {
+            is_marked = true;
+        } else if matches!(first, '.' | '!' | '|') {
+            begins_sentence = true;
+        } else if matches!(first, ',' | ';') {
+            is_marked = false;
+        }
+        rest = after;
+    }
+    words
+}
+
+/// What a word names: numbers that are read, or something else.
+#[derive(Clone, Debug, PartialEq)]
+enum Quantity {
+    Read(Vec<Target>, Dimension),
+    Other,
+}
+
+fn quantity(word: &str, frame: Frame) -> Option<Quantity> {
+    let is_geodetic = frame == Frame::Geodetic;
+    let position = |axis: usize| Some(Quantity::Read(vec![Target::Position(axis)], Dimension::Length));
+    let horizontal =
+        |axis: usize| (!is_geodetic).then(|| Quantity::Read(vec![Target::Position(axis)], Dimension::Length));
+    let degrees =
+        |axis: usize| is_geodetic.then(|| Quantity::Read(vec![Target::Position(axis)], Dimension::Angle));
+    let angle = |axis: usize| Some(Quantity::Read(vec![Target::Angle(axis)], Dimension::Angle));
+    let (north, east) = if frame == Frame::EastNorthUp { (1, 0) } else { (0, 1) };
+    match word {
+        "time" | "times" | "timestamp" | "timestamps" | "stamp" | "stamps" | "t" | "clock" => {
+            Some(Quantity::Read(vec![Target::Time], Dimension::Time))
+        }
+        "lat" | "latitude" | "latitudes" => degrees(0),
+        "lon" | "lng" | "long" | "longitude" | "longitudes" => degrees(1),
+        "alt" | "alts" | "altitude" | "altitudes" | "height" | "heights" | "elevation" | "elevations"
+        | "ele" | "elev" | "hmsl" | "hae" | "down" | "z" | "tz" => position(2),
+        "north" | "northing" => horizontal(north),
+        "east" | "easting" => horizontal(east),
+        "x" | "tx" => horizontal(0),
+        "y" | "ty" => horizontal(1),
+        "position" | "positions" | "coordinate" | "coordinates" | "location" | "locations" if is_geodetic => {
+            Some(Quantity::Read(vec![Target::Position(0), Target::Position(1)], Dimension::Angle))
+        }
+        "position" | "positions" | "coordinate" | "coordinates" | "location" | "locations"
+        | "translation" | "translations" | "xyz" | "length" | "lengths" => Some(match is_geodetic {
+            true => Quantity::Read(vec![Target::Position(2)], Dimension::Length),
+            false => Quantity::Read((0..3).map(Target::Position).collect(), Dimension::Length),
+        }),
+        "roll" | "bank" => angle(0),
+        "pitch" => angle(1),
+        "yaw" | "heading" | "headings" | "hdg" => angle(2),
+        "angle" | "angles" | "attitude" | "attitudes" | "orientation" | "orientations" | "euler" | "rpy"
+        | "rotation" | "rotations" => {
+            Some(Quantity::Read((0..3).map(Target::Angle).collect(), Dimension::Angle))
+        }
+        _ => OTHERS.contains(&word).then_some(Quantity::Other),
+    }
+}
+
+/// Letters that are units only where they plainly stand for one.
+fn is_short(word: &str) -> bool {
+    word.chars().count() <= 1
+        || matches!(
+            word,
+            "us" | "mi"
+                | "hr"
+                | "hrs"
+                | "min"
+                | "mins"
+                | "minute"
+                | "minutes"
+                | "hour"
+                | "hours"
+                | "day"
+                | "days"
+                | "dd"
+                | "second"
+                | "foot"
+                | "inch"
+                | "mm"
+                | "cm"
+                | "dm"
+                | "yd"
+        )
+}
+
+fn unit(word: &str) -> Option<&'static Unit> {
+    match parse_qualifier(word)? {
+        Qualifier::Unit(unit) => Some(unit),
+        _ => None,
+    }
+}
+
+/// The unit at a word and the number of its words: `1e-7 degrees` and `us survey feet` are one unit each.
+fn unit_at(words: &[Word<'_>], index: usize) -> Option<(&'static Unit, usize)> {
+    let first = words[index].text;
+    let may_be_joined = is_number(first) || matches!(first, "us" | "survey");
+    (1..=3).rev().filter(|&count| count == 1 || may_be_joined).find_map(|count| {
+        let parts: String = words.get(index..index + count)?.iter().map(|word| word.text).collect();
+        unit(&parts).map(|unit| (unit, count))
+    })
+}
+
+fn is_number(word: &str) -> bool {
+    word.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// Finds the units of a line.
+// Long because a word's meaning depends on those beside it.
+pub(super) fn find(line: &str, frame: Frame) -> Found {
+    let lower = line.to_lowercase();
+    let words = words(&lower);
+    let text = |index: usize| words.get(index).map_or("", |word| word.text);
+    let is_hedged = words.iter().any(|word| HEDGES.contains(&word.text));
+    let states_units = words.iter().any(|word| matches!(word.text, "unit" | "units"));
+    let mut found = Found::default();
+    let mut pending: Vec<Quantity> = Vec::new();
+    let mut next = 0;
+    while let Some(word) = words.get(next) {
+        let index = next;
+        let before = index.checked_sub(1).map_or("", text);
+        next += 1;
+        if word.begins_sentence {
+            pending.clear();
+        }
+        if let Some(quantity) = quantity(word.text, frame) {
+            let is_qualified = word.is_adjacent && OTHERS.contains(&before);
+            if quantity == Quantity::Other && word.is_adjacent && self::quantity(before, frame).is_some() {
+                pending.pop();
+            }
+            pending.push(if is_qualified { Quantity::Other } else { quantity });
+            continue;
+        }
+        if OTHER_UNITS.contains(&word.text) {
+            pending.retain(|quantity| *quantity != Quantity::Other);
+        }
+        let Some((unit, count)) = unit_at(&words, index) else { continue };
+        next += count - 1;
+        let is_plain_word =
+            count > 1 || word.is_marked || matches!(before, "in" | "unit" | "units") || !is_short(word.text);
+        if !is_plain_word || (count == 1 && is_number(before)) {
+            continue;
+        }
+        // Feet per minute, m/s: the unit of another quantity.
+        let has_other_dimension =
+            |word: &str| self::unit(word).is_some_and(|other| other.dimension != unit.dimension);
+        if text(next) == "per"
+            || before == "per"
+            || (text(next) == "/" && has_other_dimension(text(next + 1)))
+            || (before == "/" && index > 1 && has_other_dimension(text(index - 2)))
+        {
+            pending.clear();
+            continue;
+        }
+        let is_linked = word.is_marked
+            || LINKS.contains(&before)
+            || quantity(before, frame).is_some()
+            || self::unit(before).is_some();
+        let mut targets: Vec<Target> = Vec::new();
+        let had_others = pending.contains(&Quantity::Other);
+        pending.retain(|quantity| match quantity {
+            Quantity::Read(read, dimension) if *dimension == unit.dimension => {
+                for target in read {
+                    if !targets.contains(target) {
+                        targets.push(*target);
+                    }
+                }
+                false
+            }
+            Quantity::Read(..) => true,
+            Quantity::Other => false,
+        });
+        if targets.is_empty() && had_others {
+            continue;
+        }
+        if is_linked && !is_hedged && (!targets.is_empty() || states_units) {
+            found.plain.push((targets, unit));
+        } else if unit.factor != 1.0 && unit.factor != 1e9 {
+            found.doubtful = Some(unit);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Targets of the plain units of a line, with the units' names; and the unit in doubt.
+    fn of(line: &str) -> (Vec<(Vec<Target>, &'static str)>, Option<&'static str>) {
+        let found = find(line, Frame::Geodetic);
+        let plain = found.plain.into_iter().map(|(targets, unit)| (targets, unit.name)).collect();
+        (plain, found.doubtful.map(|unit| unit.name))
+    }
+
+    #[test]
+    fn units_of_quantities_are_found_in_prose() {
+        use Target::{Angle, Position, Time};
+        let height = || vec![Position(2)];
+        let angles = || (0..3).map(Angle).collect::<Vec<_>>();
+        for (line, plain) in [
+            ("heights in feet above mean sea level", vec![(height(), "ft")]),
+            ("Altitude: ft", vec![(height(), "ft")]),
+            ("altitude (feet), speed (knots)", vec![(height(), "ft")]),
+            ("speed in knots, altitude in feet", vec![(height(), "ft")]),
+            ("roll, pitch and yaw are in radians", vec![(angles(), "rad")]),
+            ("attitude angles in radians; time in ms", vec![(angles(), "rad"), (vec![Time], "ms")]),
+            ("lat/lon in 1e-7 degrees", vec![(vec![Position(0), Position(1)], "1e-7 deg")]),
+            ("height in US survey feet", vec![(height(), "US survey foot")]),
+            ("Length Units,Millimeters", vec![(height(), "mm")]),
+            ("units: feet", vec![(vec![], "ft")]),
+            (
+                "lat, lon, alt in degrees and feet",
+                vec![(vec![Position(0), Position(1)], "deg"), (height(), "ft")],
+            ),
+        ] {
+            assert_eq!(of(line), (plain, None), "{line}");
+        }
+        for line in [
+            "flown at 400 feet",
+            "speed in feet per second",
+            "climb rate: ft/min",
+            "antenna height in feet",
+            "height accuracy in feet",
+            "time offset in ms, from the pilot's log",
+            "velocities in m/s",
+            "recorded by us on day 3",
+        ] {
+            assert_eq!(of(line), (vec![], None), "{line}");
+        }
+        for (line, unit) in [
+            ("altitude converted from feet to metres", "ft"),
+            ("heights are not in feet", "ft"),
+            ("everything in radians", "rad"),
+        ] {
+            let (plain, doubtful) = of(line);
+            assert_eq!((plain, doubtful), (vec![], Some(unit)), "{line}");
+        }
+    }
+}
