@@ -53,16 +53,22 @@ mod foreign_formats;
 mod gpx;
 mod header;
 mod height_column;
+mod height_datum;
+mod held_positions;
 mod igc;
 mod kinds;
 mod kml;
 mod layout;
 mod mcap_file;
+mod message_columns;
+mod motive;
 mod quaternions;
 mod reference;
+mod row_selection;
 mod rows;
 mod scalars;
 mod sparse_rows;
+mod stamp_resolution;
 mod streams;
 mod text_table;
 mod time_fields;
@@ -71,6 +77,7 @@ mod ulog;
 mod units;
 mod unknown_unit;
 mod unused_keys;
+mod written_numbers;
 
 use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;
@@ -175,13 +182,17 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
             columns::format_name(spec.format)
         )));
     }
-    let table = text_table::Table::new(content);
+    if motive::is_motive(content) {
+        return motive::read(path, content, spec);
+    }
+    let mut table = text_table::Table::new(content);
     if table.rows.is_empty() {
         return Err(FlightLogError::Empty { path: path.to_owned() });
     }
     let mut notes = Vec::new();
     notes.extend(unused_keys::unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
+    row_selection::keep_rows(&mut table, &layout, &mut notes).map_err(problem)?;
     let mut rows = rows::read(path, &table, &layout)?;
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
     let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
@@ -205,6 +216,8 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
     let (is_geodetic, reads_attitude) =
         (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
+    stamp_resolution::spread_equal_stamps(&mut rows.rows, &mut notes).map_err(problem)?;
+    held_positions::interpolate_held(&mut rows.rows, is_geodetic, &mut notes);
     sparse_rows::interpolate_positions(&mut rows.rows, is_geodetic, reads_attitude, &mut notes);
     if table.has_decimal_commas {
         notes.push(Note {

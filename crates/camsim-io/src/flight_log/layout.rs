@@ -10,14 +10,16 @@ use camsim_core::{
 use super::{
     FlightLogError,
     attitude_columns::attitude_columns,
-    column_meaning::ColumnMeaning,
+    column_meaning::{ColumnMeaning, FixCode},
     column_selection::{
         has_time_and_position, missing_columns_message, note_unused_columns, position_columns, time_columns,
     },
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
     detect,
     header::HeaderColumns,
+    height_datum,
     text_table::{HeaderLine, Table},
+    time_fields,
 };
 
 /// The meaning of the columns of a table.
@@ -33,6 +35,12 @@ pub(super) struct TableLayout {
     pub(super) has_header: bool,
     /// Column that identifies the vehicle of a row.
     pub(super) vehicle: Option<usize>,
+    /// Column that numbers the receiver or estimator of a row.
+    pub(super) receiver: Option<usize>,
+    /// Column that says whether the receiver of a row was in use.
+    pub(super) in_use: Option<usize>,
+    /// Columns of the quality of a fix, with their codes.
+    pub(super) fixes: Vec<(usize, FixCode)>,
 }
 
 impl TableLayout {
@@ -96,6 +104,9 @@ impl TableLayout {
                 .collect(),
             has_header: false,
             vehicle: None,
+            receiver: None,
+            in_use: None,
+            fixes: Vec::new(),
         }
     }
 
@@ -105,7 +116,7 @@ impl TableLayout {
         spec: &FlightSpec,
         notes: &mut Vec<Note>,
     ) -> Result<Self, String> {
-        let time = time_columns(header, notes)?;
+        let time = time_columns(header, table, notes)?;
         let attitude = if spec.attitude == AttitudeSource::Track {
             AttitudeColumns::None
         } else {
@@ -123,9 +134,26 @@ impl TableLayout {
         };
         let time = TimeColumns { integers_are_ns: format == LogFormat::Euroc, ..time };
         note_unused_columns(header, frame, attitude, notes);
+        height_datum::check(header, table, position[2].column, frame, spec, notes);
         let names = header.0.iter().map(|column| column.name.clone()).collect();
-        let vehicle = header.columns_where(|meaning| meaning == ColumnMeaning::Vehicle).first().copied();
-        Ok(Self { format, time, frame, position, attitude, names, has_header: true, vehicle })
+        let first = |meaning: ColumnMeaning| header.columns_where(|other| other == meaning).first().copied();
+        let fixes = (0..header.0.len()).filter_map(|column| match header.parsed(column)?.meaning {
+            ColumnMeaning::Fix(code) => Some((column, code)),
+            _ => None,
+        });
+        Ok(Self {
+            format,
+            time,
+            frame,
+            position,
+            attitude,
+            names,
+            has_header: true,
+            vehicle: first(ColumnMeaning::Vehicle),
+            receiver: first(ColumnMeaning::Receiver),
+            in_use: first(ColumnMeaning::InUse),
+            fixes: fixes.collect(),
+        })
     }
 
     /// Number of columns that a row must have.
@@ -155,7 +183,7 @@ fn parse_header(
     line: &HeaderLine<'_>,
     above: Option<&HeaderLine<'_>>,
 ) -> Result<Option<HeaderColumns>, FlightLogError> {
-    let names = table.names(line.text);
+    let names = names_of_columns(table, line.text);
     let with_units = |above: &HeaderLine<'_>| {
         HeaderColumns::parse_with_units(&table.names(above.text), &names).filter(has_time_and_position)
     };
@@ -184,6 +212,39 @@ fn parse_header(
         )));
     }
     Ok(Some(header))
+}
+
+/// The names of a header, one for each column. A time in two columns, a date and a clock or a GPS week and
+/// its seconds, may have one name.
+fn names_of_columns<'a>(table: &Table<'a>, text: &'a str) -> Vec<&'a str> {
+    let mut names = table.names(text);
+    if names.len() + 1 != table.columns {
+        return names;
+    }
+    let Some(first) = table.rows.first().map(|row| table.fields(row)) else { return names };
+    let is_number_in = |field: &str, range: std::ops::Range<f64>| {
+        table.number(field).is_some_and(|value| range.contains(&value))
+    };
+    for (index, pair) in first.windows(2).enumerate().take(names.len()) {
+        let meaning = HeaderColumns::parse(&names[index..=index]).parsed(0).map(|parsed| parsed.meaning);
+        if !matches!(meaning, Some(ColumnMeaning::Time | ColumnMeaning::DateTime)) {
+            continue;
+        }
+        if time_fields::date_ns(pair[0]).is_some() && time_fields::clock_ns(pair[1]).is_some() {
+            names.insert(index, "date");
+            break;
+        }
+        // Weeks since 1980, of this century.
+        if meaning == Some(ColumnMeaning::DateTime)
+            && pair[0].bytes().all(|byte| byte.is_ascii_digit())
+            && is_number_in(pair[0], 1000.0..6000.0)
+            && is_number_in(pair[1], 0.0..604_801.0)
+        {
+            names.splice(index..=index, ["week", "tow_s"]);
+            break;
+        }
+    }
+    names
 }
 
 /// The header at the end of a comment, as in `# format: timestamp tx ty ...` and `# columns are t x y ...`:
