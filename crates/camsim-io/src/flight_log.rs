@@ -213,6 +213,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
             &mut notes,
         );
     }
+    clock_rollover::leave_out_unset_clock(&mut rows.rows, &mut notes);
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
     let (is_geodetic, reads_attitude) =
         (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);

@@ -161,6 +161,10 @@ fn solutions_of_rtklib_are_read() {
         false => in_meters(line),
     });
     let earth = blanks.replace("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)");
+    let in_parts = lines(&blanks, |_, line| match line.starts_with('%') {
+        true => line.replace("(deg)", "(d'\")"),
+        false => line.replace("47.05", "47 03 00.05").replace("8.31", "8 18 36.31"),
+    });
     let stated: &[&str] = &["line 4 says, are above the ellipsoid"];
     check_all(vec![
         ("blanks", blanks.clone(), track(ellipsoid()), Ok(without_attitude())),
@@ -176,6 +180,12 @@ fn solutions_of_rtklib_are_read() {
             earth,
             track(ellipsoid()),
             Err(&["x-ecef", "ECEF", "Lat/Lon/Height"]),
+        ),
+        (
+            "degrees, minutes, seconds",
+            in_parts,
+            track(ellipsoid()),
+            Err(&["columns of their own", "decimals"]),
         ),
         ("only satellites", commas.replace("GPST,", "epoch,"), track(ellipsoid()), Err(&["name no time"])),
     ]);
@@ -243,7 +253,7 @@ fn tables_of_photos_are_read() {
 #[test]
 fn tables_of_messages_are_read() {
     let messages = data("34-mavlogdump-csv/L04c_mavlogdump_real.csv");
-    let merged: &[&str] = &["no row states everything", "read as"];
+    let merged: &[&str] = &["no row states everything"];
     let ardupilot = "timestamp,GPS.TimeUS,GPS.I,GPS.Status,GPS.Lat,GPS.Lng,GPS.Alt,GPS.U,ATT.TimeUS,ATT.Roll,ATT.Pitch,ATT.Yaw\n";
     let plain = lines(&messages, |index, line| {
         if index == 0 {
@@ -280,10 +290,11 @@ fn one_receiver_and_its_fixes_are_kept() {
     let receivers = data("07-csv-gps-instances/DF_GPS2.csv");
     let fixes = data("09-csv-fix-type/L53b_fixtype_slow.csv");
     let used: &[&str] = &[
-        "rows of `0` (61 rows) and `1` (61 rows): those that (`U`) says are in use count",
+        "rows of `0` (61 rows) and `1` (61 rows): those that column 16 (`U`) says are in use count",
         "names its unit",
+        "`GCrs`",
     ];
-    let first: &[&str] = &["those of `0` count, and 61 rows are left out", "names its unit"];
+    let first: &[&str] = &["those of `0` count, and 61 rows are left out", "names its unit", "`GCrs`"];
     let swapped = lines(&receivers, |index, line| match (index, line.rsplit_once(',')) {
         (0, _) => line.to_owned(),
         (_, Some((rest, flag))) => format!("{rest},{}", if flag == "0" { "1" } else { "0" }),
@@ -353,12 +364,25 @@ fn clocks_of_several_kinds_are_read() {
     });
     let go_pro = data("48-gpmf-csv/L03_gopro.csv");
     let dates_only = lines(&go_pro, |_, line| line.split_once(',').unwrap().1.to_owned());
+    let unset = lines(&dates_only, |index, line| match index {
+        1..=10 => line.replace("2023-05-04", "1980-01-06"),
+        _ => line.to_owned(),
+    });
+    let set = Flight {
+        rows: 51,
+        seconds: 5.0,
+        velocity_m_s: [7.04, 13.26, -1.0],
+        tolerance_m_s: 0.2,
+        notes: &["10 rows have times before 1990"],
+        ..without_attitude()
+    };
     let other_datum: &[&str] = &["(`altitude system`) says, are above mean sea level"];
     check_all(vec![
         ("stamp and arrival", two, tum, Ok(stamps)),
         ("whole seconds", seconds.clone(), msl(), Ok(Flight { notes: coarse, tolerance_m_s: 0.1, ..USUAL })),
         ("whole seconds, from within one", without(3), msl(), Ok(later(58, 5.7, 60.6))),
         ("one time", stopped, msl(), Err(&["all 61 rows have the same time", "stands still"])),
+        ("clock not set yet", unset, track(msl()), Ok(set)),
         ("GoPro", go_pro.clone(), track(msl()), Ok(without_attitude())),
         (
             "GoPro, ellipsoid",
@@ -373,7 +397,7 @@ fn clocks_of_several_kinds_are_read() {
 #[test]
 fn held_positions_are_interpolated() {
     let held = data("16-held-gps-positions/FZ1.csv");
-    let notes: &[&str] = &["change in every 10th row only, each 0.2 s"];
+    let notes: &[&str] = &["change once in 10 rows only, each 0.2 s"];
     let flight = Flight { rows: 301, seconds: 6.0, notes, ..USUAL };
     let from_within = |first: usize| {
         let kept = held.lines().enumerate().filter(|(index, _)| !(1..first).contains(index));

@@ -47,6 +47,7 @@ pub(super) const PREFIXES: &[&str] = &[
     "nav_",
     "gnss_",
     "flight_",
+    "field_",
 ];
 
 /// All known names.
@@ -180,7 +181,15 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
     ),
     known_name(
         ColumnMeaning::Height(Some(VerticalDatum::Ellipsoid)),
-        &["hae", "ellipsoid_height", "ellipsoidal_height", "height_above_ellipsoid", "h_ell", "alt_ell"],
+        &[
+            "hae",
+            "ellipsoid_height",
+            "ellipsoidal_height",
+            "height_above_ellipsoid",
+            "h_ell",
+            "alt_ell",
+            "field_altitude",
+        ],
         "height above the ellipsoid",
         "applied; a warning where flight.height says otherwise",
     ),
@@ -517,6 +526,7 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
             "gpsfix",
             "gnss_fix",
             "gnss_fix_type",
+            "gps_lock",
             "fix",
             "fix_dimension",
             "fix_mode",

@@ -66,7 +66,7 @@ pub(super) fn time_columns(
     table: &Table<'_>,
     notes: &mut Vec<Note>,
 ) -> Result<TimeColumns, String> {
-    let times = stamps_of_the_measurement(header, notes);
+    let times = stamps_of_the_measurement(header, table, notes);
     let mut parts = header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart);
     parts.retain(|&column| header.stem(column) != "ns" || !counts_satellites(table, column));
     let texts = date_times(header, table, notes);
@@ -123,10 +123,31 @@ pub(super) fn time_columns(
     Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, nanoseconds })
 }
 
-/// Columns of times. Of ROS messages the time of the measurement, in their header, counts before the time of
+/// Whether a column holds one text in all of several rows.
+fn is_constant(table: &Table<'_>, column: usize) -> bool {
+    let field = |row| table.fields(row).get(column).copied();
+    table
+        .rows
+        .first()
+        .is_some_and(|first| table.rows.len() > 1 && table.rows.iter().all(|row| field(row) == field(first)))
+}
+
+/// Columns of times, without those that stand still. Of ROS messages the time of the measurement, in their header, counts before the time of
 /// their arrival, which jitters.
-fn stamps_of_the_measurement(header: &HeaderColumns, notes: &mut Vec<Note>) -> Vec<usize> {
-    let times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
+fn stamps_of_the_measurement(header: &HeaderColumns, table: &Table<'_>, notes: &mut Vec<Note>) -> Vec<usize> {
+    let mut times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
+    let all = times.clone();
+    // Parts of a time may stand still.
+    let is_part = |column: usize| header.parsed(column).is_some_and(|parsed| parsed.is_bare_unit);
+    times.retain(|&column| is_part(column) || !is_constant(table, column));
+    if times.is_empty() {
+        times = all;
+    } else if times.len() < all.len() {
+        push_information(
+            notes,
+            format!("of the times {} those that stand still do not count", header.describe(&all)),
+        );
+    }
     let stamps: Vec<usize> =
         times.iter().copied().filter(|&column| header.stem(column).ends_with("header_stamp")).collect();
     if stamps.len() != 1 || times.len() == 1 {
@@ -204,8 +225,8 @@ pub(super) fn position_columns(
     if has_geodetic && has_height && matches!(format, LogFormat::Auto | LogFormat::CsvLla) {
         let letters = header.columns_where(|meaning| meaning == ColumnMeaning::Hemisphere);
         let horizontal = header.unique_each([Latitude, Longitude])?;
-        let are_signed = horizontal.is_some_and(|columns| hemispheres_are_signed(table, &letters, columns));
-        if !letters.is_empty() && !are_signed {
+        let are_signed = |columns| hemispheres_are_signed(table, &letters, columns);
+        if !letters.is_empty() && !horizontal.is_some_and(are_signed) {
             return Err(format!(
                 "{} say the hemisphere by letters: write signed degrees and remove these columns",
                 header.describe(&letters)

@@ -163,8 +163,8 @@ pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
 // Long because the rules for qualifiers share the meaning, unit and problem found so far.
 fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     let name = name.trim_matches(['"', '\'', ' ']);
-    if let Some(meaning) = px4_quaternion(name) {
-        return Some(ParsedName::stated(meaning, "q", None));
+    if let Some((meaning, stem)) = numbered_part(name) {
+        return Some(ParsedName::stated(meaning, stem, None));
     }
     let (mut bare, mut qualifier_texts) = split_brackets(name);
     join_bracketed_quantity(&mut bare, &mut qualifier_texts);
@@ -223,15 +223,21 @@ fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     Some(ParsedName { meaning, stem, unit, is_bare_unit, problem })
 }
 
-/// The part of a quaternion that PX4's exports number: `q[0]`, `vehicle_attitude.q[3]`.
-fn px4_quaternion(name: &str) -> Option<ColumnMeaning> {
+/// The part that exports number, of PX4's quaternion (`q[0]`, `vehicle_attitude.q[3]`) or of a position in
+/// a black box (`GPS_coord[0]`).
+fn numbered_part(name: &str) -> Option<(ColumnMeaning, &'static str)> {
+    match name {
+        "GPS_coord[0]" => return Some((ColumnMeaning::Latitude, "lat")),
+        "GPS_coord[1]" => return Some((ColumnMeaning::Longitude, "lon")),
+        _ => {}
+    }
     let (before, number) = name.strip_suffix(']')?.rsplit_once("q[")?;
     if !(before.is_empty() || before.ends_with(['.', '/', ':']) || before.ends_with("attitude_")) {
         return None;
     }
     use ColumnMeaning::{Qw, Qx, Qy, Qz};
     let index: usize = number.parse().ok()?;
-    [Qw, Qx, Qy, Qz].get(index).copied()
+    [Qw, Qx, Qy, Qz].get(index).map(|&meaning| (meaning, "q"))
 }
 
 /// Splits a name into the text outside of brackets and the texts inside.

@@ -47,7 +47,7 @@ pub(super) fn interpolate_held(rows: &mut Vec<ParsedRow>, is_geodetic: bool, not
     rows.retain(|row| !held.contains(&row.line) || row.has_position());
     let left_out = before - rows.len();
     let mut text = format!(
-        "the positions change in every {period}th row only, each {} s, as those of a slower receiver do: they are \
+        "the positions change once in {period} rows only, each {} s, as those of a slower receiver do: they are \
             interpolated between the changes",
         format_short(period_ns as f64 * 1e-9)
     );

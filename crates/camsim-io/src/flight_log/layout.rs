@@ -204,6 +204,14 @@ fn parse_header(
         return if line.is_comment { Ok(None) } else { Err(problem(missing_columns_message(&header))) };
     }
     if !table.fits(header.0.len()) {
+        // RTKLIB's names of such columns.
+        if line.text.contains("latitude(d'\")") {
+            return Err(problem(
+                "degrees, minutes and seconds stand in columns of their own: write degrees with decimals \
+                    (RTKLIB: Lat/Lon format ddd.ddddddd)"
+                    .to_owned(),
+            ));
+        }
         return Err(problem(format!(
             "it names {} columns, but the rows have {}: give every column one name (a comma within a name \
                 needs quotes, decimal commas need semicolons between the columns)",

@@ -77,7 +77,9 @@ fn keep_one_receiver(table: &mut Table<'_>, layout: &TableLayout, notes: &mut Ve
         .collect();
     retain(table, &keeps);
     let which = match in_use {
-        Some(column) => format!("those that{} says are in use count", layout.bracketed_name(column)),
+        Some(column) => {
+            format!("those that column {}{} says are in use count", column + 1, layout.bracketed_name(column))
+        }
         None => format!("those of `{first}` count"),
     };
     let all: Vec<String> = counts.iter().map(|(name, rows)| format!("`{name}` ({rows} rows)")).collect();
@@ -121,24 +123,9 @@ fn has_fix(text: &str, code: FixCode) -> Option<bool> {
     }
     let word: String = text.to_ascii_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     let word = word.trim_start_matches("gpsfixtype").trim_start_matches("fixtype").trim_start_matches("gps");
-    const NONE: [&str; 13] = [
-        "none",
-        "nofix",
-        "no",
-        "invalid",
-        "false",
-        "v",
-        "nogps",
-        "f",
-        "lost",
-        "notvalid",
-        "unavailable",
-        "2d",
-        "2dfix",
-    ];
-    const SOME: [&str; 22] = [
-        "3d",
-        "3dfix",
+    const NONE: &[&str] =
+        &["none", "nofix", "no", "invalid", "false", "v", "nogps", "f", "lost", "notvalid", "unavailable"];
+    const SOME: &[&str] = &[
         "true",
         "a",
         "t",
@@ -153,7 +140,6 @@ fn has_fix(text: &str, code: FixCode) -> Option<bool> {
         "rtkfloat",
         "float",
         "dgps",
-        "3ddgps",
         "single",
         "sbas",
         "ppp",
@@ -161,6 +147,9 @@ fn has_fix(text: &str, code: FixCode) -> Option<bool> {
         "autonomous",
     ];
     match word {
+        // `2D Lock`, `3D RTK GPS Lock (float)`.
+        word if word.starts_with("2d") => Some(false),
+        word if word.starts_with("3d") => Some(true),
         word if NONE.contains(&word) => Some(false),
         word if SOME.contains(&word) => Some(true),
         _ => None,

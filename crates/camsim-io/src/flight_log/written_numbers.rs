@@ -14,7 +14,8 @@ pub(super) fn degrees(text: &str) -> Option<f64> {
     // A quote within quotes is written twice.
     let seconds = rest.trim().trim_end_matches('"').trim();
     let seconds = if seconds.is_empty() { "0" } else { seconds };
-    let part = |text: &str| text.trim().parse::<f64>().ok().filter(|value| (0.0..60.0).contains(value));
+    // Seconds that are rounded may be 60.
+    let part = |text: &str| text.trim().parse::<f64>().ok().filter(|value| (0.0..=60.0).contains(value));
     let degrees: f64 = degrees.trim().parse().ok()?;
     let fraction = part(minutes)? / 60.0 + part(seconds)? / 3600.0;
     Some(sign * (degrees.abs() + fraction).copysign(degrees))
@@ -44,6 +45,7 @@ mod tests {
             ("47 deg 3' 36.00\" N", Some(47.06)),
             ("47 deg 3' 36.00\"\" S", Some(-47.06)),
             ("8° 18' W", Some(-8.3)),
+            ("47 deg 2' 60.00\" N", Some(47.05)),
             ("8.31°", Some(8.31)),
             ("-8 deg 30' 0\"", Some(-8.5)),
             ("47.05N", None),
