@@ -132,13 +132,15 @@ fn is_constant(table: &Table<'_>, column: usize) -> bool {
         .is_some_and(|first| table.rows.len() > 1 && table.rows.iter().all(|row| field(row) == field(first)))
 }
 
-/// Columns of times, without those that stand still. Of ROS messages the time of the measurement, in their header, counts before the time of
-/// their arrival, which jitters.
+/// Columns of times, without those that stand still. Of ROS messages the time of the measurement, in their
+/// header, counts before the time of their arrival, which jitters.
 fn stamps_of_the_measurement(header: &HeaderColumns, table: &Table<'_>, notes: &mut Vec<Note>) -> Vec<usize> {
     let mut times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
     let all = times.clone();
     // Parts of a time may stand still.
-    let is_part = |column: usize| header.parsed(column).is_some_and(|parsed| parsed.is_bare_unit);
+    let has_parts = !header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart).is_empty();
+    let is_part =
+        |column: usize| has_parts || header.parsed(column).is_some_and(|parsed| parsed.is_bare_unit);
     times.retain(|&column| is_part(column) || !is_constant(table, column));
     if times.is_empty() {
         times = all;
@@ -169,7 +171,7 @@ fn stamps_of_the_measurement(header: &HeaderColumns, table: &Table<'_>, notes: &
 fn counts_satellites(table: &Table<'_>, column: usize) -> bool {
     table.rows.iter().all(|row| {
         let value = table.fields(row).get(column).and_then(|field| table.number(field));
-        value.is_some_and(|value| !(value.abs() >= 1000.0))
+        value.is_some_and(|value| value.is_nan() || value.abs() < 1000.0)
     })
 }
 
