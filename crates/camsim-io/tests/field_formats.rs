@@ -114,8 +114,11 @@ fn check(log: &FlightLog, flight: &Flight) -> Result<(), String> {
     }
 }
 
+/// What it is, the file, the settings, and the values or words of the message.
+type Case<'a> = (&'a str, String, FlightSpec, Result<Flight, &'a [&'a str]>);
+
 /// Checks each case; prints all faults at once.
-fn check_all(cases: Vec<(&str, String, FlightSpec, Result<Flight, &[&str]>)>) {
+fn check_all(cases: Vec<Case<'_>>) {
     let mut faults = Vec::new();
     for (what, content, spec, expected) in cases {
         let result = read(&content, &spec);
