@@ -55,19 +55,25 @@ mod gpx;
 mod header;
 mod header_lines;
 mod height_column;
+mod height_datum;
+mod held_positions;
 mod igc;
 mod kinds;
 mod kml;
 mod layout;
 mod mcap_file;
+mod message_columns;
 mod missing_columns;
+mod motive;
 mod preamble;
 mod quaternions;
 mod receiver_logs;
 mod reference;
+mod row_selection;
 mod rows;
 mod scalars;
 mod sparse_rows;
+mod stamp_resolution;
 mod statements;
 mod streams;
 mod tagged_lines;
@@ -78,6 +84,7 @@ mod ulog;
 mod units;
 mod unknown_unit;
 mod unused_keys;
+mod written_numbers;
 mod xml_prose;
 
 use columns::{AttitudeColumns, AttitudeKind, Frame};
@@ -197,7 +204,10 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
             columns::format_name(spec.format)
         )));
     }
-    let table = text_table::Table::new(content);
+    if motive::is_motive(content) {
+        return motive::read(path, content, spec);
+    }
+    let mut table = text_table::Table::new(content);
     if table.rows.is_empty() {
         let lines = table.headers.len();
         // One comment or two are a file without data, not data behind marks.
@@ -210,6 +220,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     let mut notes = table.notes.clone();
     notes.extend(unused_keys::unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
+    row_selection::keep_rows(&mut table, &layout, &mut notes).map_err(problem)?;
     let mut rows = rows::read(path, &table, &layout)?;
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
     let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
@@ -230,9 +241,12 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
             &mut notes,
         );
     }
+    clock_rollover::leave_out_unset_clock(&mut rows.rows, &mut notes);
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
     let (is_geodetic, reads_attitude) =
         (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
+    stamp_resolution::spread_equal_stamps(&mut rows.rows, &mut notes).map_err(problem)?;
+    held_positions::interpolate_held(&mut rows.rows, is_geodetic, &mut notes);
     sparse_rows::interpolate_positions(&mut rows.rows, is_geodetic, reads_attitude, &mut notes);
     if table.has_decimal_commas {
         notes.push(Note {

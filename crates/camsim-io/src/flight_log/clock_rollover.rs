@@ -60,6 +60,29 @@ pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, no
     });
 }
 
+/// The years 1990 and 2000. Clocks that are not set yet begin in 1970 or 1980.
+const YEAR_1990_NS: i128 = 631_152_000_000_000_000;
+const YEAR_2000_NS: i128 = 946_684_800_000_000_000;
+
+/// Leaves out the rows of a clock that was not set yet, where most rows have dates of this century.
+pub(super) fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<Note>) {
+    let count = |is_counted: &dyn Fn(i128) -> bool| {
+        rows.iter().filter_map(|row| row.time).filter(|time| is_counted(*time)).count()
+    };
+    let (unset, set) = (count(&|time| time < YEAR_1990_NS), count(&|time| time >= YEAR_2000_NS));
+    if unset == 0 || unset > set {
+        return;
+    }
+    rows.retain(|row| row.time.is_none_or(|time| time >= YEAR_1990_NS));
+    notes.push(Note {
+        is_warning: true,
+        text: format!(
+            "{unset} rows have times before 1990, as of a clock that is not set yet, and are left out: the \
+                others are of this century"
+        ),
+    });
+}
+
 /// With fewer rows than this before or after it, a fall of the times is an outlier, not a second flight.
 const MIN_FLIGHT_ROWS: usize = 3;
 /// With more falls than this the rows are unsorted, not several flights.

@@ -50,6 +50,28 @@ pub(super) enum ColumnMeaning {
     Hemisphere,
     /// Hours or minutes that belong to a column of seconds.
     TimePart,
+    /// Earth-centred, earth-fixed coordinates.
+    EarthCentred,
     /// Identifier of the vehicle of a row.
     Vehicle,
+    /// Number of the receiver or estimator that a row is of.
+    Receiver,
+    /// Whether the receiver of a row was the one in use.
+    InUse,
+    /// Quality of the fix of a row.
+    Fix(FixCode),
+    /// What the heights are above, in words.
+    HeightDatum,
+}
+
+/// Code of the quality of a fix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum FixCode {
+    /// 0 and 1: none; 2: two-dimensional, its height is none; from 3 on: three-dimensional. MAVLink, PX4,
+    /// u-blox, GoPro, ArduPilot.
+    Dimensions,
+    /// 0: none; any other: one. NMEA, RTKLIB, flags.
+    NonZero,
+    /// Below 0: none. NavSatFix of ROS.
+    NonNegative,
 }

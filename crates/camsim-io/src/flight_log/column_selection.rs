@@ -13,7 +13,9 @@ use super::{
     height_column::{height_column, is_height},
     missing_columns::missing_columns_message,
     text_table::{Separator, Table},
+    time_fields::TimeFormat,
     unknown_unit::unknown_units,
+    written_numbers,
 };
 
 pub(super) fn is_time(meaning: ColumnMeaning) -> bool {
@@ -29,8 +31,9 @@ pub(super) fn has_time_and_position(header: &HeaderColumns) -> bool {
         || has(LatitudeLongitude)
         || (has(North) && has(East))
         || (has(X) && has(Y));
-    any(&is_time)
-        && ((has_horizontal && (any(&is_height) || has(Down) || has(Z))) || any(&|meaning| meaning == Grid))
+    any(&|meaning| is_time(meaning) || meaning == Date)
+        && ((has_horizontal && (any(&is_height) || has(Down) || has(Z)))
+            || any(&|meaning| matches!(meaning, Grid | EarthCentred)))
 }
 
 /// Adds a note.
@@ -48,10 +51,15 @@ pub(super) fn push_warning(notes: &mut Vec<Note>, text: String) {
 /// # Errors
 /// There is no time, or several columns of it among which none can be preferred.
 // Long because it is one table of cases.
-pub(super) fn time_columns(header: &HeaderColumns, notes: &mut Vec<Note>) -> Result<TimeColumns, String> {
-    let times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
-    let parts = header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart);
-    let texts = header.columns_where(|meaning| meaning == ColumnMeaning::DateTime);
+pub(super) fn time_columns(
+    header: &HeaderColumns,
+    table: &Table<'_>,
+    notes: &mut Vec<Note>,
+) -> Result<TimeColumns, String> {
+    let times = stamps_of_the_measurement(header, table, notes);
+    let mut parts = header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart);
+    parts.retain(|&column| header.stem(column) != "ns" || !counts_satellites(table, column));
+    let texts = date_times(header, table, notes);
     // `time, ms` are two parts of one time; `time, time_ms` are two times.
     let is_bare_unit = |column: usize| header.parsed(column).is_some_and(|parsed| parsed.is_bare_unit);
     let with_unit: Vec<usize> = times
@@ -73,13 +81,13 @@ pub(super) fn time_columns(header: &HeaderColumns, notes: &mut Vec<Note>) -> Res
             *column
         }
         ([_, ..], ..) => return Err(header.ambiguity_message(&times)),
-        ([], _, [column], _) | ([], _, [], [column]) => *column,
+        ([], _, _, [column]) | ([], _, [column], []) => *column,
         ([], _, [], []) => return Err(missing_columns_message(header)),
-        ([], _, [], _) => return Err(header.ambiguity_message(&texts)),
-        ([], _, _, _) => return Err(header.ambiguity_message(&parts)),
+        ([], _, _, []) => return Err(header.ambiguity_message(&parts)),
+        ([], ..) => return Err(header.ambiguity_message(&texts)),
     };
     header.check_usable(column)?;
-    let unit_ns = if times.is_empty() && !parts.is_empty() {
+    let unit_ns = if times.is_empty() && texts.is_empty() {
         Some(column_names::NANOSECONDS.factor)
     } else {
         header.factor(column)
@@ -105,6 +113,87 @@ pub(super) fn time_columns(header: &HeaderColumns, notes: &mut Vec<Note>) -> Res
     Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, nanoseconds })
 }
 
+/// Whether a column holds one text in all of several rows.
+fn is_constant(table: &Table<'_>, column: usize) -> bool {
+    let field = |row| table.fields(row).get(column).copied();
+    table
+        .rows
+        .first()
+        .is_some_and(|first| table.rows.len() > 1 && table.rows.iter().all(|row| field(row) == field(first)))
+}
+
+/// Columns of times, without those that stand still. Of ROS messages the time of the measurement, in their
+/// header, counts before the time of their arrival, which jitters.
+fn stamps_of_the_measurement(header: &HeaderColumns, table: &Table<'_>, notes: &mut Vec<Note>) -> Vec<usize> {
+    let mut times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
+    let all = times.clone();
+    // Parts of a time may stand still.
+    let has_parts = !header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart).is_empty();
+    let is_part =
+        |column: usize| has_parts || header.parsed(column).is_some_and(|parsed| parsed.is_bare_unit);
+    times.retain(|&column| is_part(column) || !is_constant(table, column));
+    if times.is_empty() {
+        times = all;
+    } else if times.len() < all.len() {
+        push_information(
+            notes,
+            format!("of the times {} those that stand still do not count", header.describe(&all)),
+        );
+    }
+    let stamps: Vec<usize> =
+        times.iter().copied().filter(|&column| header.stem(column).ends_with("header_stamp")).collect();
+    if stamps.len() != 1 || times.len() == 1 {
+        return times;
+    }
+    push_information(
+        notes,
+        format!(
+            "of the times {} the one of the measurement counts: `{}`",
+            header.describe(&times),
+            header.name(stamps[0])
+        ),
+    );
+    stamps
+}
+
+/// Whether a column `ns` holds numbers of satellites: a clock of nanoseconds does not stay within a
+/// microsecond.
+fn counts_satellites(table: &Table<'_>, column: usize) -> bool {
+    table.rows.iter().all(|row| {
+        let value = table.fields(row).get(column).and_then(|field| table.number(field));
+        value.is_some_and(|value| value.is_nan() || value.abs() < 1000.0)
+    })
+}
+
+/// Names of dates with times in photos, the one with decimals of seconds first.
+const PHOTO_TIMES: [&str; 4] =
+    ["sub_sec_date_time_original", "gps_date_time", "date_time_original", "create_date"];
+
+/// Columns of dates with times. Of several that photos have, one counts.
+fn date_times(header: &HeaderColumns, table: &Table<'_>, notes: &mut Vec<Note>) -> Vec<usize> {
+    let texts = header.columns_where(|meaning| meaning == ColumnMeaning::DateTime);
+    if texts.is_empty() {
+        let is_date_time = |column: &usize| {
+            let fields = table.rows.iter().map(|row| table.fields(row).get(*column).copied().unwrap_or(""));
+            fields.filter_map(TimeFormat::detect).next() == Some(TimeFormat::DateTime)
+        };
+        let dates = header.columns_where(|meaning| meaning == ColumnMeaning::Date);
+        return dates.into_iter().filter(is_date_time).collect();
+    }
+    let rank = |column: usize| PHOTO_TIMES.iter().position(|name| *name == header.stem(column));
+    let first = texts.iter().copied().min_by_key(|&column| rank(column));
+    match first.filter(|_| texts.len() > 1 && texts.iter().all(|&column| rank(column).is_some())) {
+        Some(first) => {
+            push_information(
+                notes,
+                format!("of the times {} `{}` counts", header.describe(&texts), header.name(first)),
+            );
+            vec![first]
+        }
+        None => texts,
+    }
+}
+
 /// The axes of the positions and their three columns.
 ///
 /// # Errors
@@ -117,7 +206,9 @@ pub(super) fn position_columns(
     time: usize,
     notes: &mut Vec<Note>,
 ) -> Result<(Frame, [FieldSource; 3]), String> {
-    use ColumnMeaning::{Down, East, Grid, Latitude, LatitudeLongitude, Longitude, North, X, Y, Z};
+    use ColumnMeaning::{
+        Down, EarthCentred, East, Grid, Latitude, LatitudeLongitude, Longitude, North, X, Y, Z,
+    };
     let format = spec.format;
     let has = |meaning: ColumnMeaning| !header.columns_where(|other| other == meaning).is_empty();
     let has_geodetic = (has(Latitude) && has(Longitude)) || has(LatitudeLongitude);
@@ -125,7 +216,9 @@ pub(super) fn position_columns(
     let source = |column: usize| FieldSource::whole(column, header.factor(column));
     if has_geodetic && has_height && matches!(format, LogFormat::Auto | LogFormat::CsvLla) {
         let letters = header.columns_where(|meaning| meaning == ColumnMeaning::Hemisphere);
-        if !letters.is_empty() {
+        let horizontal = header.unique_each([Latitude, Longitude])?;
+        let are_signed = |columns| hemispheres_are_signed(table, &letters, columns);
+        if !letters.is_empty() && !horizontal.is_some_and(are_signed) {
             return Err(format!(
                 "{} say the hemisphere by letters: write signed degrees and remove these columns",
                 header.describe(&letters)
@@ -150,15 +243,16 @@ pub(super) fn position_columns(
             ));
         }
         let height = height_column(header, Some(spec.height), spec.height_from, notes)?;
-        let horizontal = match (header.unique_each([Latitude, Longitude])?, header.unique(LatitudeLongitude)?)
-        {
-            (Some(pair), None) => pair.map(source),
-            (None, Some(column)) => [0, 1].map(|part| FieldSource { part: Some(part), ..source(column) }),
-            (Some([latitude, longitude]), Some(both)) => {
-                return Err(header.ambiguity_message(&[latitude, longitude, both]));
-            }
-            (None, None) => return Err(missing_columns_message(header)),
-        };
+        let horizontal =
+            match (horizontal, header.columns_where(|meaning| meaning == LatitudeLongitude).first()) {
+                // A position in one field says the same.
+                (Some(pair), _) => pair.map(source),
+                (None, Some(&column)) => {
+                    header.unique(LatitudeLongitude)?;
+                    [0, 1].map(|part| FieldSource { part: Some(part), ..source(column) })
+                }
+                (None, None) => return Err(missing_columns_message(header)),
+            };
         return Ok((Frame::Geodetic, [horizontal[0], horizontal[1], source(height)]));
     }
     let format_mismatch = || {
@@ -226,7 +320,31 @@ pub(super) fn position_columns(
             header.describe(&header.columns_where(|meaning| meaning == Grid))
         ));
     }
+    if has(EarthCentred) {
+        return Err(format!(
+            "{} are coordinates from the centre of the Earth (ECEF): convert them to latitude, longitude and \
+                height (RTKLIB: solution format Lat/Lon/Height; cs2cs EPSG:4978 EPSG:4979)",
+            header.describe(&header.columns_where(|meaning| meaning == EarthCentred))
+        ));
+    }
     Err(if format == LogFormat::Auto { missing_columns_message(header) } else { format_mismatch() })
+}
+
+/// Whether letters of hemispheres say what the signs of latitude and longitude do.
+fn hemispheres_are_signed(table: &Table<'_>, letters: &[usize], [latitude, longitude]: [usize; 2]) -> bool {
+    table.rows.iter().all(|row| {
+        let fields = table.fields(row);
+        let field = |column: usize| fields.get(column).copied().unwrap_or("");
+        let is_negative = |column: usize| {
+            let value = table.number(field(column)).or_else(|| written_numbers::degrees(field(column)));
+            value.is_none_or(|value| value <= 0.0)
+        };
+        letters.iter().all(|&column| match field(column).as_bytes().first().map(u8::to_ascii_lowercase) {
+            Some(b's') => is_negative(latitude),
+            Some(b'w') => is_negative(longitude),
+            _ => true,
+        })
+    })
 }
 
 /// Columns whose name, in lower case, fulfils a condition.

@@ -2,7 +2,7 @@
 
 use super::{
     column_meaning::ColumnMeaning,
-    column_names,
+    column_names, message_columns,
     units::{Dimension, Qualifier, Unit, VerticalDatum, parse_qualifier},
 };
 
@@ -34,14 +34,19 @@ pub(super) struct ParsedName {
 #[derive(Clone, Debug)]
 pub(super) struct HeaderColumns(pub(super) Vec<HeaderColumn>);
 
+impl ParsedName {
+    /// The meaning and unit of a column that a table of messages states.
+    pub(super) fn stated(meaning: ColumnMeaning, stem: &str, unit: Option<&'static Unit>) -> Self {
+        Self { meaning, stem: stem.to_owned(), unit, is_bare_unit: false, problem: None }
+    }
+}
+
 impl HeaderColumns {
     pub(super) fn parse(names: &[&str]) -> Self {
-        Self(
-            names
-                .iter()
-                .map(|name| HeaderColumn { name: (*name).to_owned(), parsed: parse_name(name, None) })
-                .collect(),
-        )
+        let column = |name: &&str| HeaderColumn { name: (*name).to_owned(), parsed: parse_name(name, None) };
+        let mut columns = names.iter().map(column).collect::<Vec<_>>();
+        message_columns::apply(&mut columns);
+        Self(columns)
     }
 
     pub(super) fn name(&self, column: usize) -> &str {
@@ -132,10 +137,10 @@ pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
         Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => {
             Some(Dimension::Angle)
         }
-        Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid | X | Y | Z => {
-            Some(Dimension::Length)
-        }
-        DateTime | Date | Hemisphere | TimePart | Vehicle | Qx | Qy | Qz | Qw => None,
+        Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid | EarthCentred
+        | X | Y | Z => Some(Dimension::Length),
+        DateTime | Date | Hemisphere | TimePart | Vehicle | Receiver | InUse | Fix(_) | HeightDatum | Qx
+        | Qy | Qz | Qw => None,
     }
 }
 
@@ -144,17 +149,17 @@ pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
 // Long because the rules for qualifiers share the meaning, unit and problem found so far.
 pub(super) fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedName> {
     let name = name.trim_matches(['"', '\'', ' ']);
-    if let Some(meaning) = px4_quaternion(name) {
-        let (stem, unit, is_bare_unit) = ("q".to_owned(), None, false);
-        return Some(ParsedName { meaning, stem, unit, is_bare_unit, problem: None });
+    if let Some((meaning, stem)) = numbered_part(name) {
+        return Some(ParsedName::stated(meaning, stem, None));
     }
-    let (bare, mut qualifier_texts) = split_brackets(name);
+    let (mut bare, mut qualifier_texts) = split_brackets(name);
+    join_bracketed_quantity(&mut bare, &mut qualifier_texts);
     let (bare, after_comma) = bare.split_once(',').map_or((bare.as_str(), ""), |(bare, rest)| (bare, rest));
     let unit_line = unit_line.unwrap_or("").trim_matches(['[', ']', '(', ')']);
     qualifier_texts.extend([after_comma.to_owned(), unit_line.to_owned()]);
 
-    let normal = normal_form(bare);
-    let (known, stem, mut qualifiers) = split_suffixes(&normal)?;
+    let (known, stem, mut qualifiers) = split_suffixes(&normal_form(bare))
+        .or_else(|| split_suffixes(&normal_form(&with_split_acronyms(bare))))?;
     let mut problem = None;
     for text in qualifier_texts.iter().map(|text| text.trim()).filter(|text| !text.is_empty()) {
         match parse_qualifiers(text) {
@@ -204,15 +209,21 @@ pub(super) fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedNa
     Some(ParsedName { meaning, stem, unit, is_bare_unit, problem })
 }
 
-/// The part of a quaternion that PX4's exports number: `q[0]`, `vehicle_attitude.q[3]`.
-fn px4_quaternion(name: &str) -> Option<ColumnMeaning> {
+/// The part that exports number, of PX4's quaternion (`q[0]`, `vehicle_attitude.q[3]`) or of a position in
+/// a black box (`GPS_coord[0]`).
+fn numbered_part(name: &str) -> Option<(ColumnMeaning, &'static str)> {
+    match name {
+        "GPS_coord[0]" => return Some((ColumnMeaning::Latitude, "lat")),
+        "GPS_coord[1]" => return Some((ColumnMeaning::Longitude, "lon")),
+        _ => {}
+    }
     let (before, number) = name.strip_suffix(']')?.rsplit_once("q[")?;
     if !(before.is_empty() || before.ends_with(['.', '/', ':']) || before.ends_with("attitude_")) {
         return None;
     }
     use ColumnMeaning::{Qw, Qx, Qy, Qz};
     let index: usize = number.parse().ok()?;
-    [Qw, Qx, Qy, Qz].get(index).copied()
+    [Qw, Qx, Qy, Qz].get(index).map(|&meaning| (meaning, "q"))
 }
 
 /// Splits a name into the text outside of brackets and the texts inside.
@@ -228,6 +239,34 @@ fn split_brackets(name: &str) -> (String, Vec<String>) {
     }
     bare.push_str(rest);
     (bare, inside)
+}
+
+/// Appends a quantity in brackets to the name of its instrument: `GPS (Lat.) [deg]` is `GPS Lat. [deg]`.
+fn join_bracketed_quantity(bare: &mut String, inside: &mut Vec<String>) {
+    let Some(first) = inside.first().filter(|text| parse_qualifiers(text).is_none()) else { return };
+    let is_instrument =
+        column_names::PREFIXES.iter().any(|prefix| prefix.trim_end_matches('_') == normal_form(bare));
+    if is_instrument {
+        *bare = format!("{} {first}", bare.trim_end());
+        inside.remove(0);
+    }
+}
+
+/// A name whose acronyms are words of their own: `GPSLatitude` is `GPS Latitude`.
+fn with_split_acronyms(name: &str) -> String {
+    let characters: Vec<char> = name.chars().collect();
+    let mut split = String::with_capacity(name.len() + 4);
+    for (index, &c) in characters.iter().enumerate() {
+        let ends_acronym = index > 0
+            && c.is_uppercase()
+            && characters[index - 1].is_uppercase()
+            && characters.get(index + 1).is_some_and(|next| next.is_lowercase());
+        if ends_acronym {
+            split.push(' ');
+        }
+        split.push(c);
+    }
+    split
 }
 
 /// The normal form of a name: lower case, words joined by single underscores. `TimeUS` is two words.
@@ -323,6 +362,8 @@ mod tests {
             ("heading (deg, magnetic)", MagneticYaw, "deg"),
             ("p_RS_R_x [m]", X, "m"),
             ("north_km", North, "km"),
+            ("GPS (Lat.) [deg]", Latitude, "deg"),
+            ("FlightYawDegree", Yaw, "deg"),
         ] {
             let parsed = parse_name(name, None).unwrap_or_else(|| panic!("{name}"));
             assert_eq!(
@@ -336,6 +377,8 @@ mod tests {
             ("q_RS_w []", Qw),
             ("alt_ellipsoid", Height(Some(VerticalDatum::Ellipsoid))),
             ("datetime(utc)", DateTime),
+            ("GPSLatitude", Latitude),
+            ("SubSecDateTimeOriginal", DateTime),
         ] {
             let parsed = parse_name(name, None).unwrap();
             assert_eq!((parsed.meaning, parsed.problem), (meaning, None), "{name}");
@@ -351,6 +394,8 @@ mod tests {
             "vx",
             "",
             "ImageFile",
+            "GPS (2D speed) [m/s]",
+            "Accelerometer (x) [m/s2]",
         ] {
             assert_eq!(parse_name(name, None), None, "{name}");
         }

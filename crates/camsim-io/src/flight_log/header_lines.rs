@@ -14,6 +14,7 @@ use super::{
     header::{HeaderColumn, HeaderColumns, ParsedName, dimension, parse_name, parse_qualifiers},
     missing_columns::missing_columns_message,
     text_table::{HeaderLine, Table, is_missing},
+    time_fields,
     units::Qualifier,
 };
 
@@ -55,7 +56,16 @@ impl<'a> HeaderLines<'a> {
         let Some((index, header)) = complete else { return Self::without_names(path, table, spec, notes) };
         let names_line = table.headers[index];
         if !table.fits(header.0.len()) {
-            return fail(names_line.number, width_message(header.0.len(), table));
+            // RTKLIB's names of such columns.
+            let problem = match names_line.text.contains("latitude(d'\")") {
+                true => {
+                    "degrees, minutes and seconds stand in columns of their own: write degrees with decimals \
+                    (RTKLIB: Lat/Lon format ddd.ddddddd)"
+                        .to_owned()
+                }
+                false => width_message(header.0.len(), table),
+            };
+            return fail(names_line.number, problem);
         }
         let mut header = header;
         let mut prose = Vec::new();
@@ -138,11 +148,44 @@ fn below_message(below: &HeaderColumns, names_line: usize) -> String {
 
 /// The columns that a line names, if they include a time and a position.
 fn complete_names(table: &Table<'_>, line: &HeaderLine<'_>) -> Option<HeaderColumns> {
-    let header = HeaderColumns::parse(&table.names(line.text));
+    let header = HeaderColumns::parse(&names_of_columns(table, line.text));
     if has_time_and_position(&header) && (table.fits(header.0.len()) || !line.is_comment) {
         return Some(header);
     }
     if line.is_comment { header_after_prose(table, line.text) } else { None }
+}
+
+/// The names of a header, one for each column. A time in two columns, a date and a clock or a GPS week and
+/// its seconds, may have one name.
+fn names_of_columns<'a>(table: &Table<'a>, text: &'a str) -> Vec<&'a str> {
+    let mut names = table.names(text);
+    if names.len() + 1 != table.columns {
+        return names;
+    }
+    let Some(first) = table.rows.first().map(|row| table.fields(row)) else { return names };
+    let is_number_in = |field: &str, range: std::ops::Range<f64>| {
+        table.number(field).is_some_and(|value| range.contains(&value))
+    };
+    for (index, pair) in first.windows(2).enumerate().take(names.len()) {
+        let meaning = HeaderColumns::parse(&names[index..=index]).parsed(0).map(|parsed| parsed.meaning);
+        if !matches!(meaning, Some(ColumnMeaning::Time | ColumnMeaning::DateTime)) {
+            continue;
+        }
+        if time_fields::date_ns(pair[0]).is_some() && time_fields::clock_ns(pair[1]).is_some() {
+            names.insert(index, "date");
+            break;
+        }
+        // Weeks since 1980, of this century.
+        if meaning == Some(ColumnMeaning::DateTime)
+            && pair[0].bytes().all(|byte| byte.is_ascii_digit())
+            && is_number_in(pair[0], 1000.0..6000.0)
+            && is_number_in(pair[1], 0.0..604_801.0)
+        {
+            names.splice(index..=index, ["week", "tow_s"]);
+            break;
+        }
+    }
+    names
 }
 
 /// The header at the end of a comment, as in `# format: timestamp tx ty ...` and `# columns are t x y ...`:

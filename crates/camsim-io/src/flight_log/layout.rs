@@ -10,13 +10,13 @@ use camsim_core::{
 use super::{
     FlightLogError,
     attitude_columns::attitude_columns,
-    column_meaning::ColumnMeaning,
+    column_meaning::{ColumnMeaning, FixCode},
     column_selection::{note_unused_columns, position_columns, push_warning, time_columns},
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
     detect,
     header::HeaderColumns,
     header_lines::{HeaderLines, width_message},
-    statements,
+    height_datum, statements,
     text_table::Table,
 };
 
@@ -33,6 +33,12 @@ pub(super) struct TableLayout {
     pub(super) has_header: bool,
     /// Column that identifies the vehicle of a row.
     pub(super) vehicle: Option<usize>,
+    /// Column that numbers the receiver or estimator of a row.
+    pub(super) receiver: Option<usize>,
+    /// Column that says whether the receiver of a row was in use.
+    pub(super) in_use: Option<usize>,
+    /// Columns of the quality of a fix, with their codes.
+    pub(super) fixes: Vec<(usize, FixCode)>,
 }
 
 impl TableLayout {
@@ -142,6 +148,9 @@ impl TableLayout {
                 .collect(),
             has_header: false,
             vehicle: None,
+            receiver: None,
+            in_use: None,
+            fixes: Vec::new(),
         }
     }
 
@@ -151,7 +160,7 @@ impl TableLayout {
         spec: &FlightSpec,
         notes: &mut Vec<Note>,
     ) -> Result<Self, String> {
-        let time = time_columns(header, notes)?;
+        let time = time_columns(header, table, notes)?;
         let attitude = if spec.attitude == AttitudeSource::Track {
             AttitudeColumns::None
         } else {
@@ -169,9 +178,26 @@ impl TableLayout {
         };
         let time = TimeColumns { integers_are_ns: format == LogFormat::Euroc, ..time };
         note_unused_columns(header, frame, attitude, notes);
+        height_datum::check(header, table, position[2].column, frame, spec, notes);
         let names = header.0.iter().map(|column| column.name.clone()).collect();
-        let vehicle = header.columns_where(|meaning| meaning == ColumnMeaning::Vehicle).first().copied();
-        Ok(Self { format, time, frame, position, attitude, names, has_header: true, vehicle })
+        let first = |meaning: ColumnMeaning| header.columns_where(|other| other == meaning).first().copied();
+        let fixes = (0..header.0.len()).filter_map(|column| match header.parsed(column)?.meaning {
+            ColumnMeaning::Fix(code) => Some((column, code)),
+            _ => None,
+        });
+        Ok(Self {
+            format,
+            time,
+            frame,
+            position,
+            attitude,
+            names,
+            has_header: true,
+            vehicle: first(ColumnMeaning::Vehicle),
+            receiver: first(ColumnMeaning::Receiver),
+            in_use: first(ColumnMeaning::InUse),
+            fixes: fixes.collect(),
+        })
     }
 
     /// Number of columns that a row must have.

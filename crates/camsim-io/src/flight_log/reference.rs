@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{
     column_names::{KNOWN_NAMES, PREFIXES},
     foreign_formats::{FOREIGN_FORMATS, OTHER_BINARY, OTHER_XML, SUBTITLES},
+    message_columns,
     receiver_logs::RECEIVER_LOGS,
     units::{Dimension, UNITS},
 };
@@ -20,6 +21,11 @@ const FORMATS: &[(&str, &str, &str)] = &[
     ("csv-ned", "t, north, east, down, roll, pitch, yaw", "metres; degrees"),
     ("tum", "t, x, y, z, qx, qy, qz, qw", "metres, x east, y north, z up; body forward-left-up"),
     ("euroc", "t, x, y, z, qw, qx, qy, qz", "as tum; whole times are nanoseconds"),
+    (
+        "Motive's CSV",
+        "`Format Version,...`, then the columns of rigid bodies; flight.topic chooses one of several",
+        "in its Length Units, x east, z south, y up; quaternions of a body with x forward, y up",
+    ),
     ("gpx", "`trkpt` with lat, lon, `ele`, `time`", "no attitude: flight.attitude = \"track\""),
     (
         "kml",
@@ -76,7 +82,7 @@ const KEYS: &[(&str, &str)] = &[
     ),
     (
         "topic",
-        "ulog, dataflash, mcap: the stream of the positions, and behind a comma that of the attitudes \
+        "Motive: the rigid body. ulog, dataflash, mcap: the stream of the positions, and behind a comma that of the attitudes \
             (`vehicle_gps_position, vehicle_attitude`; `GPS, AHR2`; `/fix, /imu`); `#1` behind a name is an \
             instance, a core, or a child frame",
     ),
@@ -135,6 +141,31 @@ const RULES: &[(&str, &str)] = &[
         "numbers; `h:m:s`, also with AM or PM, with a date column if there is one; ISO 8601 with `T` or a \
             blank, `Z` or an offset. Dates are year-month-day. A clock that begins again (midnight, GPS \
             week, 32 bit counters of us and ms) goes on, with a warning",
+    ),
+    (
+        "Times in two columns under one name",
+        "a date and a clock, or a GPS week and its seconds, as RTKLIB writes them, are taken apart",
+    ),
+    ("Two clocks of ROS", "the stamp in a message's header counts before the time of arrival (`%time`)"),
+    (
+        "Coarse clocks",
+        "rows that share the stamps of a clock (ten rows for each whole second) are spread evenly over its \
+            steps, with a warning; a clock that stands still while the platform moves is refused. Rows before \
+            1990 among rows of this century, of a clock that is not set yet, are left out and counted",
+    ),
+    (
+        "Held positions",
+        "positions that change in every n-th row only, at least once a second, while the attitude goes on, are \
+            interpolated between the changes, with a warning; rows beyond the first and last change are left out",
+    ),
+    (
+        "Numbers with words",
+        "of latitude, longitude and height: `47 deg 3' 36.00\" N`, `480 m Above Sea Level`, as exiftool writes",
+    ),
+    (
+        "What heights are above",
+        "by the name of their column, a column of words, or RTKLIB's comment; a warning where flight.height \
+            says otherwise",
     ),
     (
         "Missing values",
@@ -214,6 +245,12 @@ pub fn reference() -> String {
         let names: Vec<String> = known.names.iter().map(|name| format!("`{name}`")).collect();
         // Writing to a String cannot fail.
         let _ = writeln!(text, "| {} | {} | {} |", known.quantity, names.join(", "), known.treatment);
+    }
+    text += "\n## Columns of messages\n\nColumns `MESSAGE.field`, as `mavlogdump.py --format csv` writes them for \
+        several messages. Of several messages with a position, or with an attitude, the first here counts.\n\n\
+        | message | fields |\n|---|---|\n";
+    for (message, fields) in message_columns::documentation() {
+        let _ = writeln!(text, "| {message} | {fields} |");
     }
     text += "\n## Units\n\nAll are applied. Spellings count without blanks, underscores, dots, hyphens and \
         signs of multiplication.\n\n| of | unit | is | spellings |\n|---|---|---|---|\n";

@@ -8,6 +8,7 @@ use super::{
     layout::TableLayout,
     text_table::{self, Line, Table},
     time_fields::{self, TimeFormat},
+    written_numbers,
 };
 
 /// The numbers of a row; NaN where a value is missing.
@@ -145,8 +146,9 @@ impl<'a> RowReader<'a> {
         let row = RowFields { reader: self, line: line.number, fields };
         let time = row.time()?;
         let mut position = [f64::NAN; 3];
-        for (value, source) in position.iter_mut().zip(self.layout.position) {
-            *value = row.number(source)?;
+        for (axis, source) in self.layout.position.into_iter().enumerate() {
+            let number = row.number(source);
+            position[axis] = number.or_else(|error| row.written_number(axis, source).ok_or(error))?;
         }
         if self.layout.frame == Frame::Geodetic {
             row.check_geodetic_range(position)?;
@@ -213,6 +215,20 @@ impl<'a> RowFields<'a, '_> {
             }
         };
         Ok(value * source.factor.unwrap_or(1.0))
+    }
+
+    /// A latitude, longitude (axes 0 and 1) or height with its unit in the field, as exiftool writes it.
+    fn written_number(&self, axis: usize, source: FieldSource) -> Option<f64> {
+        let is_base_unit = source.factor.is_none_or(|factor| factor == 1.0);
+        if self.reader.layout.frame != Frame::Geodetic || !is_base_unit {
+            return None;
+        }
+        let field = self.fields.get(source.column)?;
+        match source.part {
+            Some(part) => written_numbers::degrees(field.split(',').nth(part)?),
+            None if axis < 2 => written_numbers::degrees(field),
+            None => written_numbers::metres(field),
+        }
     }
 
     fn time(&self) -> Result<Option<i128>, FlightLogError> {

@@ -4,6 +4,8 @@
 //! with latitude and longitude only, then the position of rows with an attitude only. The later cleaning of
 //! the log interpolates attitudes, as rotations, and drops rows outside the time span of a quantity.
 
+use std::collections::HashSet;
+
 use camsim_core::flight_log::Note;
 
 use super::rows::ParsedRow;
@@ -42,6 +44,10 @@ pub(super) fn interpolate_positions(
             has_attitude(row) && !has_position(row)
         });
         filled.push("positions");
+        // A row with a position only says nothing more than one of the same time with both.
+        let complete: HashSet<Option<i128>> =
+            rows.iter().filter(|row| has_attitude(row) && has_position(row)).map(|row| row.time).collect();
+        rows.retain(|row| row.has_attitude() || !complete.contains(&row.time));
     }
     let is_empty_row = |row: &ParsedRow| !has_position(row) && !row.has_attitude();
     let empty = count(rows, &is_empty_row);

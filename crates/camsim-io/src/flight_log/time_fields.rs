@@ -146,10 +146,10 @@ fn offset_ns(text: &str) -> Option<i128> {
     (hours <= 14 && minutes <= 59).then_some(sign * (hours * 60 + minutes) * 60_000_000_000)
 }
 
-/// Parses `2023-05-01`, also with slashes or dots, as nanoseconds from 1970 to the start of that day. Dates
+/// Parses `2023-05-01`, also with slashes, dots or colons (photos), as nanoseconds from 1970 to the start of that day. Dates
 /// that begin with day or month are ambiguous, and `None`.
 pub(super) fn date_ns(field: &str) -> Option<i128> {
-    let separator = ['-', '/', '.'].into_iter().find(|&c| field.matches(c).count() == 2)?;
+    let separator = ['-', '/', '.', ':'].into_iter().find(|&c| field.matches(c).count() == 2)?;
     let mut parts = field.split(separator);
     let (year, month, day) = (parts.next()?, unsigned(parts.next()?, 2)?, unsigned(parts.next()?, 2)?);
     if year.len() != 4 || !(1..=12).contains(&month) || !(1..=31).contains(&day) {

@@ -65,7 +65,7 @@ pub(super) static NANOSECOND: Unit = unit(
 pub(super) static MINUTE: Unit = unit("min", Dimension::Time, 60e9, &["min", "mins", "minute", "minutes"]);
 pub(super) static HOUR: Unit = unit("h", Dimension::Time, 3600e9, &["h", "hr", "hrs", "hour", "hours"]);
 static DAY: Unit = unit("days", Dimension::Time, 86_400e9, &["day", "days"]);
-static METRE: Unit =
+pub(super) static METRE: Unit =
     unit("m", Dimension::Length, 1.0, &["m", "meter", "meters", "metre", "metres", "mtr", "mtrs"]);
 static FOOT: Unit = unit("ft", Dimension::Length, 0.3048, &["ft", "foot", "feet"]);
 static SURVEY_FOOT: Unit = unit(
@@ -86,7 +86,7 @@ static SURVEY_FOOT: Unit = unit(
         "usfeet",
     ],
 );
-static MILLIMETRE: Unit =
+pub(super) static MILLIMETRE: Unit =
     unit("mm", Dimension::Length, 1e-3, &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]);
 static CENTIMETRE: Unit =
     unit("cm", Dimension::Length, 1e-2, &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]);
@@ -97,8 +97,9 @@ static KILOMETRE: Unit =
 static INCH: Unit = unit("inch", Dimension::Length, 0.0254, &["inch", "inches"]);
 static YARD: Unit = unit("yd", Dimension::Length, 0.9144, &["yd", "yds", "yard", "yards"]);
 static MILE: Unit = unit("mi", Dimension::Length, 1609.344, &["mi", "mile", "miles"]);
-static DEGREE: Unit = unit("deg", Dimension::Angle, 1.0, &["deg", "degs", "degree", "degrees", "°", "@"]);
-static RADIAN: Unit =
+pub(super) static DEGREE: Unit =
+    unit("deg", Dimension::Angle, 1.0, &["deg", "degs", "degree", "degrees", "°", "@"]);
+pub(super) static RADIAN: Unit =
     unit("rad", Dimension::Angle, 180.0 / std::f64::consts::PI, &["rad", "rads", "radian", "radians"]);
 static MILLIRADIAN: Unit = unit(
     "mrad",
@@ -120,7 +121,7 @@ static CENTIDEGREE: Unit = unit(
 );
 static MILLIDEGREE: Unit =
     unit("mdeg", Dimension::Angle, 1e-3, &["mdeg", "millideg", "millidegree", "millidegrees"]);
-static DEGREE_E7: Unit = unit(
+pub(super) static DEGREE_E7: Unit = unit(
     "1e-7 deg",
     Dimension::Angle,
     1e-7,

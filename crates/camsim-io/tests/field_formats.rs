@@ -1,0 +1,490 @@
+//! Tables of other programs, and clocks and receivers of several kinds: each is read with the known values, or
+//! refused with a message that helps. Most describe one flight: 15 m/s, a climb of 1 m/s, yaw from 60 degrees.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use camsim_core::{
+    flight_log::{FlightLog, HeightConversion},
+    scenario::{
+        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
+        TimeUnit,
+    },
+};
+use camsim_io::flight_log::read_flight_log;
+use glam::{DVec3, EulerRot};
+
+fn ellipsoid() -> FlightSpec {
+    FlightSpec {
+        log: PathBuf::new(),
+        format: LogFormat::Auto,
+        time_unit: TimeUnit::Auto,
+        angle_unit: AngleUnit::Auto,
+        angles: AngleKind::Auto,
+        attitude: AttitudeSource::Log,
+        origin: Origin::First,
+        height: HeightReference::Ellipsoid,
+        height_from: HeightSource::Auto,
+        topic: None,
+        window_s: None,
+        speed: 1.0,
+    }
+}
+
+fn msl() -> FlightSpec {
+    FlightSpec { height: HeightReference::Msl, ..ellipsoid() }
+}
+
+fn track(spec: FlightSpec) -> FlightSpec {
+    FlightSpec { attitude: AttitudeSource::Track, ..spec }
+}
+
+/// Expected values of a log.
+struct Flight {
+    rows: usize,
+    seconds: f64,
+    /// Velocity over the first step, north, east, down.
+    velocity_m_s: [f64; 3],
+    /// Largest difference of any step's speed from that of the first.
+    tolerance_m_s: f64,
+    /// Attitude of the first row; `None` where it is not read.
+    yaw_pitch_roll_deg: Option<[f64; 3]>,
+    /// Words of all notes.
+    notes: &'static [&'static str],
+}
+
+const USUAL: Flight = Flight {
+    rows: 61,
+    seconds: 6.0,
+    velocity_m_s: [7.5, 13.0, -1.0],
+    tolerance_m_s: 0.1,
+    yaw_pitch_roll_deg: Some([60.0, 2.0, 5.0]),
+    notes: &[],
+};
+
+fn without_attitude() -> Flight {
+    Flight { yaw_pitch_roll_deg: None, ..USUAL }
+}
+
+fn read(content: &str, spec: &FlightSpec) -> Result<FlightLog, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, content).unwrap();
+    read_flight_log(&path, spec, HeightConversion::None).map_err(|error| error.to_string())
+}
+
+fn data(file: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/field-2");
+    std::fs::read_to_string(folder.join(file)).unwrap()
+}
+
+fn check(log: &FlightLog, flight: &Flight) -> Result<(), String> {
+    let near = |what: &str, value: f64, expected: f64, tolerance: f64| {
+        let is_near = (value - expected).abs() <= tolerance;
+        if is_near { Ok(()) } else { Err(format!("{what} {value}, not {expected}")) }
+    };
+    near("rows", log.rows.len() as f64, flight.rows as f64, 0.0)?;
+    near("seconds", log.duration_s(), flight.seconds, 1e-6)?;
+    let velocities: Vec<DVec3> = log
+        .rows
+        .windows(2)
+        .map(|pair| (pair[1].position_ned_m - pair[0].position_ned_m) / (pair[1].t_s - pair[0].t_s))
+        .collect();
+    let expected = DVec3::from_array(flight.velocity_m_s);
+    near("first velocity", velocities[0].distance(expected), 0.0, flight.tolerance_m_s)?;
+    for velocity in &velocities {
+        near("speed", velocity.length(), expected.length(), flight.tolerance_m_s)?;
+    }
+    if let Some(expected) = flight.yaw_pitch_roll_deg {
+        let (yaw, pitch, roll) = log.rows[0].ned_from_body.to_euler(EulerRot::ZYX);
+        for (what, angle, expected) in
+            [("yaw", yaw, expected[0]), ("pitch", pitch, expected[1]), ("roll", roll, expected[2])]
+        {
+            near(what, angle.to_degrees(), expected, 0.05)?;
+        }
+    }
+    let texts: Vec<&str> = log.notes.iter().map(|note| note.text.as_str()).collect();
+    if let Some(words) = flight.notes.iter().find(|words| !texts.iter().any(|text| text.contains(*words))) {
+        return Err(format!("no note has `{words}`"));
+    }
+    match log.notes.iter().find(|note| !flight.notes.iter().any(|words| note.text.contains(words))) {
+        Some(note) => Err(format!("an unexpected note: {}", note.text)),
+        None => Ok(()),
+    }
+}
+
+/// What it is, the file, the settings, and the values or words of the message.
+type Case<'a> = (&'a str, String, FlightSpec, Result<Flight, &'a [&'a str]>);
+
+/// Checks each case; prints all faults at once.
+fn check_all(cases: Vec<Case<'_>>) {
+    let mut faults = Vec::new();
+    for (what, content, spec, expected) in cases {
+        let result = read(&content, &spec);
+        let fault = match (&result, expected) {
+            (Ok(log), Ok(flight)) => check(log, &flight).err(),
+            (Err(error), Err(words)) => words
+                .iter()
+                .find(|word| !error.contains(*word))
+                .map(|word| format!("the message lacks `{word}`")),
+            (Ok(_), Err(_)) => Some("read, but should be refused".to_owned()),
+            (Err(_), Ok(_)) => Some("refused".to_owned()),
+        };
+        if let Some(fault) = fault {
+            let said = result.map_or_else(|error| error, |log| format!("{} {:?}", log.report, log.notes));
+            faults.push(format!("{what}: {fault}\n    {said}"));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// The file with each line changed.
+fn lines(content: &str, change: impl Fn(usize, &str) -> String) -> String {
+    content.lines().enumerate().map(|(index, line)| change(index, line) + "\n").collect()
+}
+
+#[test]
+fn solutions_of_rtklib_are_read() {
+    let blanks = data("23-rtklib-pos/RT1.pos");
+    let commas = data("22-rtklib-comma-ns/RT7_comma.pos");
+    // 10:00 on that Thursday is second 381600 of the week.
+    let in_weeks = blanks.replace("2023/05/04 10:00:0", "2260 38160");
+    let in_meters = |line: &str| {
+        let mut fields: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+        let seconds: f64 = fields[1].rsplit(':').next().unwrap().parse().unwrap();
+        (fields[2], fields[3], fields[4]) =
+            (format!("{}", 13.0 * seconds), format!("{}", 7.5 * seconds), format!("{seconds}"));
+        fields.join(" ")
+    };
+    let baseline = lines(&blanks, |_, line| match line.starts_with('%') {
+        true => line
+            .replace("latitude(deg) longitude(deg)  height(m)", "e-baseline(m) n-baseline(m) u-baseline(m)")
+            .replace("lat/lon/height=WGS84/ellipsoidal", "e/n/u-baseline=WGS84"),
+        false => in_meters(line),
+    });
+    let earth = blanks.replace("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)");
+    let in_parts = lines(&blanks, |_, line| match line.starts_with('%') {
+        true => line.replace("(deg)", "(d'\")"),
+        false => line.replace("47.05", "47 03 00.05").replace("8.31", "8 18 36.31"),
+    });
+    let stated: &[&str] = &["line 4 says, are above the ellipsoid"];
+    check_all(vec![
+        ("blanks", blanks.clone(), track(ellipsoid()), Ok(without_attitude())),
+        ("blanks, msl", blanks.clone(), track(msl()), Ok(Flight { notes: stated, ..without_attitude() })),
+        ("geodetic", blanks.replace("/ellipsoidal", "/geodetic"), track(msl()), Ok(without_attitude())),
+        ("UTC", blanks.replace("%  GPST", "%  UTC "), track(ellipsoid()), Ok(without_attitude())),
+        ("weeks", in_weeks, track(ellipsoid()), Ok(without_attitude())),
+        ("commas", commas.clone(), track(ellipsoid()), Ok(without_attitude())),
+        ("commas, UTC", commas.replace("GPST,", "UTC,"), track(ellipsoid()), Ok(without_attitude())),
+        ("baseline", baseline, track(ellipsoid()), Ok(without_attitude())),
+        (
+            "from the centre of the Earth",
+            earth,
+            track(ellipsoid()),
+            Err(&["x-ecef", "ECEF", "Lat/Lon/Height"]),
+        ),
+        (
+            "degrees, minutes, seconds",
+            in_parts,
+            track(ellipsoid()),
+            Err(&["columns of their own", "decimals"]),
+        ),
+        ("only satellites", commas.replace("GPST,", "epoch,"), track(ellipsoid()), Err(&["name no time"])),
+    ]);
+}
+
+#[test]
+fn tables_of_photos_are_read() {
+    let photos = data("26-exiftool-csv/exifn.csv");
+    let flight = |notes| Flight { rows: 10, seconds: 18.0, velocity_m_s: [7.5, 13.0, -1.0], notes, ..USUAL };
+    let gimbal: &[&str] = &["camera.mount says where the camera looks"];
+    let in_words = |letters: [&str; 2]| {
+        lines(&photos, |index, line| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if index > 0 {
+                for (column, letter) in [(2, letters[0]), (3, letters[1])] {
+                    let value: f64 = cells[column].parse().unwrap();
+                    let (degrees, minutes) = (value.floor(), value.fract() * 60.0);
+                    let seconds = minutes.fract() * 60.0;
+                    cells[column] =
+                        format!("\"{degrees} deg {}' {seconds:.4}\"\" {letter}\"", minutes.floor());
+                }
+                cells[4] += " m Above Sea Level";
+            }
+            cells.join(",")
+        })
+    };
+    let with_column = |name: &str, value: &str| {
+        lines(&photos, |index, line| format!("{line},{}", if index == 0 { name } else { value }))
+    };
+    let says_msl: &[&str] = &["camera.mount", "are above mean sea level, flight.height says otherwise"];
+    let of_times: &[&str] = &["camera.mount", "`SubSecDateTimeOriginal` counts"];
+    let sub_seconds = lines(&photos, |index, line| {
+        let time = line.split(',').nth(1).unwrap();
+        format!(
+            "{line},{}",
+            if index == 0 { "SubSecDateTimeOriginal".to_owned() } else { format!("{time}.50+02:00") }
+        )
+    });
+    let south = Flight { velocity_m_s: [-7.5, 13.0, -1.0], ..flight(gimbal) };
+    check_all(vec![
+        ("numbers", photos.clone(), msl(), Ok(flight(gimbal))),
+        ("words", in_words(["N", "E"]), msl(), Ok(flight(gimbal))),
+        ("words, south", in_words(["S", "E"]), msl(), Ok(south)),
+        ("words, ellipsoid", in_words(["N", "E"]), ellipsoid(), Ok(flight(says_msl))),
+        ("letters", with_column("GPSLatitudeRef", "North"), msl(), Ok(flight(gimbal))),
+        (
+            "other letter",
+            with_column("GPSLatitudeRef", "S"),
+            msl(),
+            Err(&["GPSLatitudeRef", "signed degrees"]),
+        ),
+        ("reference", with_column("GPSAltitudeRef", "Above Sea Level"), ellipsoid(), Ok(flight(says_msl))),
+        ("reference, number", with_column("GPSAltitudeRef", "0"), msl(), Ok(flight(gimbal))),
+        (
+            "below",
+            with_column("GPSAltitudeRef", "1"),
+            msl(),
+            Ok(flight(&["camera.mount", "below sea level"])),
+        ),
+        ("one field", with_column("GPSPosition", "47.05 8.31"), msl(), Ok(flight(gimbal))),
+        ("decimals of seconds", sub_seconds, msl(), Ok(flight(of_times))),
+    ]);
+}
+
+#[test]
+fn tables_of_messages_are_read() {
+    let messages = data("34-mavlogdump-csv/L04c_mavlogdump_real.csv");
+    let merged: &[&str] = &["no row states everything"];
+    let ardupilot = "timestamp,GPS.TimeUS,GPS.I,GPS.Status,GPS.Lat,GPS.Lng,GPS.Alt,GPS.U,ATT.TimeUS,ATT.Roll,ATT.Pitch,ATT.Yaw\n";
+    let plain = lines(&messages, |index, line| {
+        if index == 0 {
+            return ardupilot.trim_end().to_owned();
+        }
+        let cells: Vec<&str> = line.split(',').collect();
+        match (cells[2].parse::<f64>(), cells[3].parse::<f64>(), cells[4].parse::<f64>()) {
+            (Ok(lat), Ok(lon), Ok(alt)) => {
+                format!("{},0,0,3,{:.7},{:.7},{},1,,,,", cells[0], lat * 1e-7, lon * 1e-7, alt * 1e-3)
+            }
+            _ => {
+                let degrees = |column: usize| cells[column].parse::<f64>().unwrap().to_degrees();
+                format!("{},,,,,,,,0,{},{},{}", cells[0], degrees(11), degrees(12), degrees(13))
+            }
+        }
+    });
+    let gps_raw = messages.replace("GLOBAL_POSITION_INT", "GPS_RAW_INT");
+    let extended = lines(&messages, |index, line| {
+        let more = if index == 0 { "VFR_HUD.heading,VFR_HUD.alt,AHRS2.roll,AHRS2.yaw" } else { ",,," };
+        format!("{line},{more}")
+    });
+    let near = || Flight { tolerance_m_s: 0.2, notes: merged, ..USUAL };
+    check_all(vec![
+        ("MAVLink", messages.clone(), msl(), Ok(near())),
+        ("MAVLink, semicolons", messages.replace(',', ";"), msl(), Ok(near())),
+        ("raw", gps_raw, msl(), Ok(near())),
+        ("further messages", extended, msl(), Ok(near())),
+        ("ArduPilot", plain, msl(), Ok(near())),
+    ]);
+}
+
+#[test]
+fn one_receiver_and_its_fixes_are_kept() {
+    let receivers = data("07-csv-gps-instances/DF_GPS2.csv");
+    let fixes = data("09-csv-fix-type/L53b_fixtype_slow.csv");
+    let used: &[&str] = &[
+        "rows of `0` (61 rows) and `1` (61 rows): those that column 16 (`U`) says are in use count",
+        "names its unit",
+        "`GCrs`",
+    ];
+    let first: &[&str] = &["those of `0` count, and 61 rows are left out", "names its unit", "`GCrs`"];
+    let swapped = lines(&receivers, |index, line| match (index, line.rsplit_once(',')) {
+        (0, _) => line.to_owned(),
+        (_, Some((rest, flag))) => format!("{rest},{}", if flag == "0" { "1" } else { "0" }),
+        _ => line.to_owned(),
+    });
+    let second = Flight { seconds: 6.0, ..without_attitude() };
+    let fixed = |notes| Flight {
+        rows: 51,
+        seconds: 5.0,
+        velocity_m_s: [7.04, 13.26, -1.0],
+        yaw_pitch_roll_deg: Some([62.0, 2.0, 5.0]),
+        notes,
+        ..USUAL
+    };
+    let left_out: &[&str] = &["10 rows have no three-dimensional fix by column 5 (`fix_type`)"];
+    let words = fixes.replace(",1,5.0", ",NO_FIX,5.0").replace(",3,5.0", ",3D_FIX,5.0");
+    let valid =
+        fixes.replace("fix_type", "gps_valid").replace(",1,5.0", ",False,5.0").replace(",3,5.0", ",True,5.0");
+    let flags = fixes.replace("fix_type", "fix").replace(",1,5.0", ",0,5.0").replace(",3,5.0", ",1,5.0");
+    let status =
+        fixes.replace("fix_type", "status.status").replace(",1,5.0", ",-1,5.0").replace(",3,5.0", ",0,5.0");
+    check_all(vec![
+        ("two receivers", receivers.clone(), track(msl()), Ok(Flight { notes: used, ..without_attitude() })),
+        ("the other is in use", swapped, track(msl()), Ok(Flight { notes: used, ..second })),
+        (
+            "no flag of use",
+            receivers.replace(",U\n", ",V\n"),
+            track(msl()),
+            Ok(Flight { notes: first, ..without_attitude() }),
+        ),
+        ("fix_type", fixes.clone(), msl(), Ok(fixed(left_out))),
+        ("words", words, msl(), Ok(fixed(left_out))),
+        ("validity", valid, msl(), Ok(fixed(&["10 rows have no fix by column 5 (`gps_valid`)"]))),
+        ("flags", flags, msl(), Ok(fixed(&["10 rows have no fix by", "1 is taken as a fix"]))),
+        ("ROS", status, msl(), Ok(fixed(&["10 rows have no fix by column 5 (`status.status`)"]))),
+        ("never a fix", fixes.replace(",3,5.0", ",2,5.0"), msl(), Err(&["fix_type", "remove the column"])),
+    ]);
+}
+
+#[test]
+fn clocks_of_several_kinds_are_read() {
+    let two = data("13-rostopic-two-times/L22_rostopic.csv");
+    let tum = FlightSpec { format: LogFormat::Tum, ..ellipsoid() };
+    let stamps = Flight {
+        velocity_m_s: [-0.52, 14.99, -1.0],
+        yaw_pitch_roll_deg: None,
+        notes: &["of the measurement counts: `field.header.stamp`", "read as ns"],
+        ..USUAL
+    };
+    let seconds = data("14-second-resolution-clock/L44_seconds_repeat.csv");
+    let coarse: &[&str] = &["counts in steps of 1 s, with 10 rows in most"];
+    let without = |count: usize| {
+        let kept = seconds.lines().enumerate().filter(|(index, _)| !(1..=count).contains(index));
+        kept.map(|(_, line)| format!("{line}\n")).collect::<String>()
+    };
+    let later = |rows: usize, seconds: f64, yaw: f64| Flight {
+        rows,
+        seconds,
+        velocity_m_s: [7.2, 13.2, -1.0],
+        tolerance_m_s: 0.3,
+        yaw_pitch_roll_deg: Some([yaw, 2.0, 5.0]),
+        notes: coarse,
+    };
+    let stopped = lines(&seconds, |_, line| match line.split_once(',') {
+        Some((clock, rest)) if clock != "time" => format!("10:20:00,{rest}"),
+        _ => line.to_owned(),
+    });
+    let go_pro = data("48-gpmf-csv/L03_gopro.csv");
+    let dates_only = lines(&go_pro, |_, line| line.split_once(',').unwrap().1.to_owned());
+    let unset = lines(&dates_only, |index, line| match index {
+        1..=10 => line.replace("2023-05-04", "1980-01-06"),
+        _ => line.to_owned(),
+    });
+    let set = Flight {
+        rows: 51,
+        seconds: 5.0,
+        velocity_m_s: [7.04, 13.26, -1.0],
+        tolerance_m_s: 0.2,
+        notes: &["10 rows have times before 1990"],
+        ..without_attitude()
+    };
+    let other_datum: &[&str] = &["(`altitude system`) says, are above mean sea level"];
+    check_all(vec![
+        ("stamp and arrival", two, tum, Ok(stamps)),
+        ("whole seconds", seconds.clone(), msl(), Ok(Flight { notes: coarse, tolerance_m_s: 0.1, ..USUAL })),
+        ("whole seconds, from within one", without(3), msl(), Ok(later(58, 5.7, 60.6))),
+        ("one time", stopped, msl(), Err(&["all 61 rows have the same time", "stands still"])),
+        ("clock not set yet", unset, track(msl()), Ok(set)),
+        ("GoPro", go_pro.clone(), track(msl()), Ok(without_attitude())),
+        (
+            "GoPro, ellipsoid",
+            go_pro.clone(),
+            track(ellipsoid()),
+            Ok(Flight { notes: other_datum, ..without_attitude() }),
+        ),
+        ("dates only", dates_only, track(msl()), Ok(without_attitude())),
+    ]);
+}
+
+#[test]
+fn held_positions_are_interpolated() {
+    let held = data("16-held-gps-positions/FZ1.csv");
+    let notes: &[&str] = &["change once in 10 rows only, each 0.2 s"];
+    let flight = Flight { rows: 301, seconds: 6.0, notes, ..USUAL };
+    let from_within = |first: usize| {
+        let kept = held.lines().enumerate().filter(|(index, _)| !(1..first).contains(index));
+        kept.map(|(_, line)| format!("{line}\n")).collect::<String>()
+    };
+    let resting = lines(&held, |index, line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        if index == 0 {
+            line.to_owned()
+        } else {
+            format!("{},47.05,8.31,480,{}", cells[0], cells[4..].join(","))
+        }
+    });
+    let rest = Flight { rows: 301, velocity_m_s: [0.0; 3], notes: &[], ..USUAL };
+    check_all(vec![
+        ("held", held.clone(), msl(), Ok(flight)),
+        (
+            "held, without attitude",
+            held.clone(),
+            track(msl()),
+            Ok(Flight { rows: 301, notes, ..without_attitude() }),
+        ),
+        (
+            "from within a hold",
+            from_within(4),
+            msl(),
+            Ok(Flight {
+                rows: 291,
+                seconds: 5.8,
+                velocity_m_s: [7.44, 13.03, -1.0],
+                yaw_pitch_roll_deg: Some([60.4, 2.0, 5.0]),
+                notes,
+                ..USUAL
+            }),
+        ),
+        ("at rest", resting, msl(), Ok(rest)),
+    ]);
+}
+
+#[test]
+fn tables_of_motive_are_read() {
+    let motive = data("49-motive-csv/VI2_motive.csv");
+    let stated: &[&str] =
+        &["a table of Motive in mm: x is taken as east", "start of the capture, 2023-05-04"];
+    let flight = |notes| Flight { notes, ..USUAL };
+    let two = lines(&motive, |index, line| match (index, line) {
+        (0 | 1, _) => line.to_owned(),
+        (_, line) => {
+            let more: Vec<String> =
+                line.split(',').skip(2).map(|cell| cell.replace("drone", "target")).collect();
+            format!("{line},{}", more.join(","))
+        }
+    });
+    let topic = |name: &str| FlightSpec { topic: Some(name.to_owned()), ..ellipsoid() };
+    let euler = motive.replace("Rotation Type,Quaternion", "Rotation Type,XYZ");
+    check_all(vec![
+        ("one body", motive.clone(), ellipsoid(), Ok(flight(stated))),
+        (
+            "metres",
+            motive.replace("Millimeters", "Meters"),
+            ellipsoid(),
+            Ok(Flight {
+                velocity_m_s: [7500.0, 13_000.0, -1000.0],
+                tolerance_m_s: 100.0,
+                notes: &["in m:", "capture"],
+                ..USUAL
+            }),
+        ),
+        ("two bodies", two.clone(), ellipsoid(), Err(&["`drone`, `target`", "flight.topic"])),
+        ("one of two bodies", two.clone(), topic("target"), Ok(flight(stated))),
+        ("no such body", two, topic("car"), Err(&["`car`", "`drone`"])),
+        ("angles", euler.clone(), ellipsoid(), Err(&["XYZ", "quaternions"])),
+        (
+            "angles not read",
+            euler,
+            track(ellipsoid()),
+            Ok(Flight { yaw_pitch_roll_deg: None, ..flight(stated) }),
+        ),
+        ("local", motive.replace("Global", "Local"), ellipsoid(), Err(&["Coordinate Space", "global"])),
+        (
+            "other key",
+            motive,
+            FlightSpec { format: LogFormat::Tum, ..ellipsoid() },
+            Err(&["flight.format", "Motive"]),
+        ),
+    ]);
+}
