@@ -60,3 +60,4 @@ pub mod write;
 #[cfg(test)]
 mod inputs_page;
 mod similar_file;
+mod unlikely_camera;
