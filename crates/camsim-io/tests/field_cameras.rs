@@ -511,7 +511,7 @@ fn keys_that_a_format_defines_are_read_or_refused() {
             CHAIN,
             &[("T_cam_imu", "T_cam_imu_old")],
             Only,
-            Refused(&["there are 2", "`--camera cam1`, or all with `--rig`"]),
+            Refused(&["there are 2", "`--camera cam0`, or all with `--rig`"]),
         ),
     ];
     for (file, edits, part, expected) in cases {
@@ -623,8 +623,8 @@ fn messages_name_the_thing_and_a_way() {
         ),
         (
             METASHAPE,
-            &[("\"frame\"", "\"spherical\"")],
-            Named("0"),
+            &[("\"fisheye\"", "\"spherical\"")],
+            Named("2"),
             Refused(&["`spherical`, a panorama, which has no f"]),
         ),
         (SFM, &[], Named("a spherical"), Lens(Equirectangular, &[], PANORAMA)),
