@@ -163,7 +163,7 @@ pub(super) fn entries(document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyPr
         CameraEntry {
             name: folder_of(file).filter(is_only).unwrap_or(file).to_owned(),
             aliases: vec![file.clone()],
-            value: *frame,
+            value: frame,
             roots: vec![format!("frames[{index}]")],
         }
     });
