@@ -240,6 +240,9 @@ enum Expected {
 use Expected::{Lens, Names, Refused, Told};
 use Part::{Named, Only, Rig};
 
+/// A file, texts in it and what they are replaced by, and what is imported of it.
+type Case = (&'static str, &'static [(&'static str, &'static str)], Part, Expected);
+
 /// What notes about implausible values say.
 const DOUBTS: &[&str] = &["check", "is it", "were"];
 
@@ -307,7 +310,7 @@ fn implausible_cameras_are_told_or_refused_in_all_formats() {
     const CHAIN: &str = "21-clock-offset-seconds/E10.yaml";
     const LIST: &str = "1204.5, -310.2, 95.1, 1210.0, -305.1";
     let quiet = || Told(&[], DOUBTS);
-    let cases: Vec<(&str, &[(&str, &str)], Part, Expected)> = vec![
+    let cases: Vec<Case> = vec![
         (SFM, &[], Only, Refused(&["the focal length", "2880 times the longer side", "fractions of a side"])),
         (SFM, &[("2880.0", "0.72")], Only, quiet()),
         (SFM, &[("2880.0", "0.0088")], Only, Refused(&["is it a fraction of a side, or in millimetres"])),
@@ -391,7 +394,7 @@ fn keys_that_a_format_defines_are_read_or_refused() {
     const K: &str = "\"k1\":0.02,\"k2\":0.01,\"w\":320,\"h\":240";
     const FISHEYE: &str = "\"is_fisheye\":true";
     const SECOND: &str = "\"images/0002.png\",\"fl_x\":500";
-    let cases: Vec<(&str, &[(&str, &str)], Part, Expected)> = vec![
+    let cases: Vec<Case> = vec![
         (
             FRAMES,
             &[],
@@ -529,7 +532,7 @@ fn messages_name_the_thing_and_a_way() {
     const METASHAPE: &str = "36-spherical-sensors/C01_metashape.xml";
     const SFM: &str = "36-spherical-sensors/C02d_odm_dual.json";
     const PANORAMA: [f64; 2] = [5760.0 / TAU; 2];
-    let cases: Vec<(&str, &[(&str, &str)], Part, Expected)> = vec![
+    let cases: Vec<Case> = vec![
         (
             ZED,
             &[],
