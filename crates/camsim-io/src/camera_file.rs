@@ -11,6 +11,7 @@ use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
 
 use crate::kernel_file::{KernelFileError, load_kernel};
 use crate::lens_table::{LensTableError, load_lens_table};
+use crate::unlikely_camera;
 
 mod agisoft;
 mod basalt;
@@ -29,6 +30,7 @@ mod okvis;
 mod opencv;
 mod opensfm;
 mod orb_slam;
+mod other_text;
 mod poses;
 mod reference;
 mod rig;
@@ -200,8 +202,14 @@ fn import_document(
 ) -> Result<ImportedCamera, CameraFileError> {
     let to_error = |problem| key_error(path, problem);
     let mut imported = import(document, format, options).map_err(to_error)?;
-    imported.notes.extend(plausibility_notes(&imported.spec).map_err(to_error)?);
     check(path, &imported.spec)?;
+    for doubt in unlikely_camera::doubts_of_calibration(&imported.spec) {
+        if let Some(message) = doubt.refusal() {
+            let name = options.camera.map_or(String::new(), |name| format!(" of {name}"));
+            return Err(to_error(KeyProblem::new(format!("the focal length{name}"), message)));
+        }
+        imported.notes.push(doubt.to_string());
+    }
     Ok(imported)
 }
 
@@ -298,71 +306,6 @@ fn detect(document: &Document) -> Result<CameraFormat, String> {
             ))
         }
     }
-}
-
-/// Notes about implausible values; focal lengths that cannot be in pixels are refused.
-fn plausibility_notes(spec: &CameraSpec) -> Result<Vec<String>, KeyProblem> {
-    let [width, height] = spec.size_px.map(f64::from);
-    let [fx, fy] = spec.focal_px;
-    if fx > 0.0 && fy > 0.0 && fx.min(fy) < 0.02 * width.max(height) {
-        let text = format!(
-            "is {fx} and {fy} for a picture of {width} x {height}, which is too short for pixels: check \
-             whether it is a fraction of a side or in millimetres"
-        );
-        return Err(KeyProblem::new("the focal length", text));
-    }
-    let mut notes = Vec::new();
-    if fx > 0.0 && fy > 0.0 && !(0.5..=2.0).contains(&(fx / fy)) {
-        notes.push(format!(
-            "the focal lengths {fx} and {fy} px differ by more than a factor of two: check them"
-        ));
-    }
-    use LensModel::{BrownConrady, BrownConradyPrism, Pinhole};
-    let is_flat = matches!(spec.lens.model, Pinhole | BrownConrady | BrownConradyPrism);
-    if is_flat && fx > 0.0 && fx < 0.15 * width {
-        let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
-        notes.push(format!(
-            "the horizontal field of view is about {degrees:.0} degrees, which is large for a lens that is \
-             not a fisheye: check that the focal length of {fx} is in pixels"
-        ));
-    }
-    notes.extend(spec.principal_point_px.and_then(|point| principal_point_note([width, height], point)));
-    Ok(notes)
-}
-
-/// A note about a principal point that would be the centre of another size, or is outside of the picture.
-fn principal_point_note([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
-    let centred_size = [2.0 * cx + 1.0, 2.0 * cy + 1.0];
-    let size = |[x, y]: [f64; 2]| format!("{x:.0} x {y:.0}");
-    let [across, down] = [centred_size[0] / width, centred_size[1] / height];
-    let is_rotated =
-        [centred_size[0] / height, centred_size[1] / width].iter().all(|ratio| (0.92..=1.08).contains(ratio));
-    if is_rotated && !(0.9..=1.1).contains(&(width / height)) {
-        let text = format!(
-            "the principal point ({cx}, {cy}) would be the centre of a picture of about {}, but the size is \
-             {}: check whether it is rotated",
-            size(centred_size),
-            size([width, height])
-        );
-        return Some(text);
-    }
-    if (across.max(down) < 0.85 || across.min(down) > 1.15) && (0.95..=1.05).contains(&(across / down)) {
-        let text = format!(
-            "the principal point ({cx}, {cy}) would be the centre of a picture of about {}, not of {}: check \
-             whether the calibration has another size",
-            size(centred_size),
-            size([width, height])
-        );
-        return Some(text);
-    }
-    let is_inside = (-0.5..=width - 0.5).contains(&cx) && (-0.5..=height - 0.5).contains(&cy);
-    (!is_inside).then(|| {
-        format!(
-            "the principal point ({cx}, {cy}) is outside of the picture of {}: check that the size is that \
-             of the calibration",
-            size([width, height])
-        )
-    })
 }
 
 /// Checks that the values make a camera.

@@ -60,4 +60,5 @@ pub mod write;
 #[cfg(test)]
 mod inputs_page;
 mod similar_file;
+mod unlikely_camera;
 mod wording;

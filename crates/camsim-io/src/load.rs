@@ -2,8 +2,16 @@
 
 use std::{path::PathBuf, sync::Arc};
 
+use crate::{
+    board_file::BoardFileError,
+    flight_log::{FlightLogError, read_flight_log},
+    gltf_file::{GltfError, MAX_RADIUS_M},
+    kernel_file::{KernelFileError, load_kernel},
+    lens_table::{LensTableError, load_lens_table},
+    pictures::{PictureError, read_gray_image},
+    terrain::{TerrainFileError, TerrainSummary},
+};
 use camsim_core::{
-    camera::CameraModel,
     exposure::{ExposureError, ExposureTrack},
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
@@ -15,17 +23,6 @@ use camsim_core::{
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{TrackResult, TrackerError, track},
-};
-use glam::DVec2;
-
-use crate::{
-    board_file::BoardFileError,
-    flight_log::{FlightLogError, read_flight_log},
-    gltf_file::{GltfError, MAX_RADIUS_M},
-    kernel_file::{KernelFileError, load_kernel},
-    lens_table::{LensTableError, load_lens_table},
-    pictures::{PictureError, read_gray_image},
-    terrain::{TerrainFileError, TerrainSummary},
 };
 
 mod coverage;
@@ -474,26 +471,6 @@ pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &TrackResu
 /// Distance of the flight from the origin above which a wrong origin is likely.
 const FAR_FROM_ORIGIN_M: f64 = 500e3;
 
-/// Warns if the lens has no ray for part of the picture. Samples every 16th pixel of a fixed lens.
-fn invalid_pixels_warning(sequence: &Sequence) -> Option<String> {
-    let camera = CameraModel::from_spec(&sequence.scenario.camera).ok()?;
-    let [width, height] = camera.size_px;
-    let (mut all, mut invalid) = (0_u32, 0_u32);
-    for y in (8..height).step_by(16) {
-        for x in (8..width).step_by(16) {
-            all += 1;
-            invalid += u32::from(camera.ray(DVec2::new(f64::from(x), f64::from(y))).is_none());
-        }
-    }
-    let share = 100.0 * f64::from(invalid) / f64::from(all.max(1));
-    (share >= 0.5).then(|| {
-        format!(
-            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see \
-                `camsim lens SCENARIO.toml check`"
-        )
-    })
-}
-
 /// Warns of shutter times that no sensor has at this frame rate. They are rendered as they are.
 fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
     let period_ms = 1e3 / camera.fps;
@@ -531,7 +508,6 @@ fn warnings(
     terrain: Option<&TerrainSummary>,
 ) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
-    warnings.extend(invalid_pixels_warning(sequence));
     warnings.extend(unlikely_values(&sequence.scenario.camera));
     warnings.extend(optics_warnings(sequence));
     let far_m = sequence.path.pose(sequence.start_s).position_ned_m.length();

@@ -9,14 +9,21 @@ use serde_json::Value;
 use super::document::{Document, KeyProblem, find, number, optional_number, size, word};
 use super::key_table::{KeyRow, Neutral, Treatment};
 use super::selection::CameraEntry;
-use super::{CameraFormat, ImportedCamera, camera};
+use super::{CameraFormat, ImportedCamera, camera, lens_models};
+
+/// A panorama.
+const SPHERICAL: &str = "spherical";
 
 const SKEW: &str = "skew, which is not supported: recalibrate without it";
 const TANGENTIAL: &str = "a tangential term of higher order, which is not supported: recalibrate without it";
 
 /// Keys of a single calibration.
 pub(super) const KEYS: &[KeyRow] = &[
-    KeyRow::new("projection", Treatment::Applied, "frame or fisheye; others are refused. Also `type`"),
+    KeyRow::new(
+        "projection",
+        Treatment::Applied,
+        "frame, fisheye or spherical (a whole turn); others are refused. Also `type`",
+    ),
     KeyRow::new("type", Treatment::Applied, "as projection"),
     KeyRow::new("width", Treatment::Applied, "width"),
     KeyRow::new("height", Treatment::Applied, "height"),
@@ -86,8 +93,9 @@ pub(super) const SENSOR_KEYS: &[KeyRow] = &[
 ];
 
 pub(super) fn matches(document: &Document) -> bool {
-    let is_single =
-        document.root == "calibration" && ["f", "fx"].iter().any(|key| find(&document.value, key).is_some());
+    let is_single = document.root == "calibration"
+        && (["f", "fx"].iter().any(|key| find(&document.value, key).is_some())
+            || word(&document.value, "projection") == Some(SPHERICAL));
     is_single || document.root == "document" && find(&document.value, "chunk").is_some()
 }
 
@@ -135,8 +143,12 @@ pub(super) fn import(document: &Document, value: &Value) -> Result<ImportedCamer
     if document.root == "calibration" {
         return calibration(value, None);
     }
-    let sensor_calibration = calibration_of(value)
-        .ok_or_else(|| KeyProblem::new("calibration", "is missing: align the cameras before exporting"))?;
+    let sensor_calibration = match calibration_of(value) {
+        Some(found) => found,
+        // It has nothing to calibrate.
+        None if word(value, "type") == Some(SPHERICAL) => return calibration(value, None),
+        None => return Err(KeyProblem::new("calibration", "is missing: align the cameras before exporting")),
+    };
     calibration(sensor_calibration, Some(value))
         .map_err(|problem| KeyProblem { key: format!("calibration.{}", problem.key), ..problem })
 }
@@ -170,6 +182,20 @@ fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, 
     let dimensions = resolution(value).or_else(|| sensor.and_then(resolution));
     let [width, height] = dimensions.unwrap_or_else(|| Err(KeyProblem::new("width", "is missing")))?;
     let size_px = size("width", [width, height])?;
+    let projection = word(value, "projection")
+        .or_else(|| word(value, "type"))
+        .or_else(|| sensor.and_then(|sensor| word(sensor, "type")))
+        .unwrap_or("frame");
+    if projection == SPHERICAL {
+        let others = ["f", "fx", "fy", "cx", "cy", "b1", "k1", "k2", "k3", "k4", "p1", "p2"];
+        return lens_models::panorama(
+            CameraFormat::Agisoft,
+            value,
+            ("projection", SPHERICAL),
+            size_px,
+            &others,
+        );
+    }
     let [k1, k2, k3, k4] = [or_zero("k1")?, or_zero("k2")?, or_zero("k3")?, or_zero("k4")?];
     let (p1, p2) = (or_zero("p1")?, or_zero("p2")?);
     // Files for both programs have both sets of keys; the newer program's are used.
@@ -180,10 +206,7 @@ fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, 
         ([number(value, "fx")?, number(value, "fy")?], [number(value, "cx")?, number(value, "cy")?], [p1, p2])
     };
     let principal_point_px = [corner_based[0] - 0.5, corner_based[1] - 0.5];
-    let projection = word(value, "projection")
-        .or_else(|| word(value, "type"))
-        .or_else(|| sensor.and_then(|sensor| word(sensor, "type")));
-    let (model, coefficients) = match projection.unwrap_or("frame") {
+    let (model, coefficients) = match projection {
         "frame" if k4 != 0.0 => {
             return Err(KeyProblem::new(
                 "k4",
@@ -201,7 +224,7 @@ fn calibration(value: &Value, sensor: Option<&Value>) -> Result<ImportedCamera, 
         other => {
             return Err(KeyProblem::new(
                 "projection",
-                format!("is `{other}`: frame and fisheye (equidistant) can be imported"),
+                format!("is `{other}`: frame, fisheye (equidistant) and spherical can be imported"),
             ));
         }
     };

@@ -150,14 +150,8 @@ pub(super) fn import(document: &Document, entry: &CameraEntry<'_>) -> Result<Imp
         "ucm" => (LensModel::Ucm, &["alpha"]),
         "pinhole-radtan8" => (LensModel::BrownConrady, &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
         other => {
-            let full_name =
-                lens_models::unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
-            return Err(KeyProblem::new(
-                "camera_type",
-                format!(
-                    "is `{other}`{full_name}, which is not supported: calibrate with kb4, ds, eucm, ucm or pinhole-radtan8"
-                ),
-            ));
+            let advice = "calibrate with kb4, ds, eucm, ucm or pinhole-radtan8";
+            return Err(KeyProblem::new("camera_type", lens_models::unsupported_model(other, advice)));
         }
     };
     let coefficients = all(names)?;

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::document::{Document, KeyProblem, find, number, size, word};
 use super::key_table::{KeyRow, Neutral, Treatment};
-use super::{CameraFormat, ImportedCamera, camera};
+use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
 const ESTIMATOR: &str = "a setting of the estimator";
 
@@ -164,13 +164,9 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
             (LensModel::KannalaBrandt, projection(["mu", "mv", "u0", "v0"])?, coefficients)
         }
         other => {
-            let full_name = super::lens_models::unsupported_model_name(&other.to_ascii_lowercase())
-                .map_or(String::new(), |name| format!(" ({name})"));
-            let text = format!(
-                "is `{other}`{full_name}, which is not supported: PINHOLE, PINHOLE_FULL, KANNALA_BRANDT and \
-                 MEI can be imported; a lens of another model is a table of points (docs/LENSES.md)"
-            );
-            return Err(KeyProblem::new("model_type", text));
+            let advice = "PINHOLE, PINHOLE_FULL, KANNALA_BRANDT and MEI can be imported; a lens of another model is \
+                          a table of points (docs/LENSES.md)";
+            return Err(KeyProblem::new("model_type", lens_models::unsupported_model(other, advice)));
         }
     };
     let (focal_px, principal_point_px) = ([numbers[0], numbers[1]], [numbers[2], numbers[3]]);

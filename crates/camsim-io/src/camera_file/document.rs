@@ -5,7 +5,7 @@ use serde_json::Value;
 /// A parsed file; see [`Document::parse`] in `syntax`.
 #[derive(Debug)]
 pub(crate) struct Document {
-    /// Name of an XML file's root element; `ini` and `colmap` for those formats; else empty.
+    /// Name of an XML file's root element; that of the format of texts with a parser of their own; else empty.
     pub(crate) root: String,
     /// Content; XML attributes and elements are keys.
     pub(crate) value: Value,

@@ -8,7 +8,7 @@ use super::selection::CameraEntry;
 use super::syntax::LENS_DATABASE;
 use super::{
     ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, nerfstudio, okvis, opencv,
-    opensfm, orb_slam, reference, ros, vikit,
+    opensfm, orb_slam, other_text, reference, ros, vikit,
 };
 
 /// Formats that can be imported.
@@ -155,6 +155,7 @@ impl CameraFormat {
                 if entries.is_empty() {
                     return Err(KeyProblem::new("camera_matrix", "is missing, or is not 3 x 3"));
                 }
+                opencv::check_coefficients(&entries)?;
                 entries
             }
             Self::Kalibr => kalibr::entries(document),
@@ -166,12 +167,12 @@ impl CameraFormat {
             Self::NCamera => ncamera::entries(document),
             Self::Agisoft => return agisoft::entries(document),
             Self::OpenSfm => return opensfm::entries(document),
+            Self::Nerfstudio => return nerfstudio::entries(document),
             Self::Euroc
             | Self::RosCameraInfo
             | Self::Camodocal
             | Self::Reference
             | Self::Gyroflow
-            | Self::Nerfstudio
             | Self::Vikit => CameraEntry::single(&document.value),
         })
     }
@@ -255,7 +256,7 @@ impl CameraFormat {
             Self::NCamera => ncamera::import(value),
             Self::Vikit => vikit::import(value),
             Self::OpenSfm => opensfm::import(value),
-            Self::Nerfstudio => nerfstudio::import(value),
+            Self::Nerfstudio => nerfstudio::import(document, entry),
         }
     }
 }
@@ -285,12 +286,14 @@ pub(super) fn unsupported_hint(document: &Document) -> Option<String> {
                     distortion_coefficients, image_width and image_height to a YAML file";
         return Some(text.to_owned());
     }
-    if find(value, "IntrinsicMatrix").is_some() || find(value, "P0").is_some() && find(value, "P1").is_some()
-    {
-        let text = "this is a matrix of another program (MATLAB's is transposed and counts pixels from 1, \
-                    KITTI's P0 to P3 are for rectified pictures): write camera_matrix, \
-                    distortion_coefficients, image_width and image_height to a YAML file";
+    if find(value, "IntrinsicMatrix").is_some() {
+        let text = "this is MATLAB's transposed matrix, whose pixels count from 1: write camera_matrix ([fx, 0, cx - 1, \
+                    0, fy, cy - 1, 0, 0, 1]), distortion_coefficients ([k1, k2, p1, p2, k3]), image_width and \
+                    image_height to a YAML file";
         return Some(text.to_owned());
+    }
+    if let Some(hint) = other_text::hint(document) {
+        return Some(hint);
     }
     if find(value, "distortion_model").is_some() || find(value, "distortion_coefficients").is_some() {
         return Some(

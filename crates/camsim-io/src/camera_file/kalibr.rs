@@ -7,7 +7,10 @@ use super::key_table::{KeyRow, Neutral, Treatment};
 use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
-const POSE: &str = "pose relative to an IMU or another camera, whose axes are not the body's: `--body` or `--rig` applies it";
+const POSE: &str = "pose relative to an IMU, whose axes are not the body's: `--body` or `--rig` applies it";
+const BETWEEN: &str = "pose relative to the camera before it: `--body` or `--rig` applies it";
+const OTHER_POSE: &str = "a pose under another name: as T_cam_imu, camera from IMU, or its inverse T_imu_cam, `--body` or \
+                          `--rig` applies it";
 const OFFSET: &str = "clock offset between camera and IMU, s, which shifts all stamps: `--body` or `--rig` \
                       applies it";
 
@@ -42,7 +45,10 @@ pub(super) const KEYS: &[KeyRow] = &[
     ),
     KeyRow::new("cam*.rate_hz", Treatment::FrameRate, "frames per second"),
     KeyRow::new("cam*.timeshift_cam_imu", Treatment::Reported(Neutral::Zero), OFFSET),
-    KeyRow::new("cam*.T_*", Treatment::Reported(Neutral::Identity), POSE),
+    KeyRow::new("cam*.T_cam_imu", Treatment::Reported(Neutral::Identity), POSE),
+    KeyRow::new("cam*.T_imu_cam", Treatment::Reported(Neutral::Identity), POSE),
+    KeyRow::new("cam*.T_cn_cnm1", Treatment::Reported(Neutral::Identity), BETWEEN),
+    KeyRow::new("cam*.T_*", Treatment::Reported(Neutral::Identity), OTHER_POSE),
     KeyRow::new(
         "cam*.mask*",
         Treatment::Reported(Neutral::Never),
@@ -71,7 +77,12 @@ pub(super) const EUROC_KEYS: &[KeyRow] = &[
     KeyRow::new("rate_hz", Treatment::FrameRate, "frames per second"),
     KeyRow::new("line_delay", Treatment::LineDelay(1e3), "s per row; the readout is this times the rows"),
     KeyRow::new("timeshift_cam_imu", Treatment::Reported(Neutral::Zero), OFFSET),
-    KeyRow::new("T_*", Treatment::Reported(Neutral::Identity), POSE),
+    KeyRow::new("T_BS", Treatment::Reported(Neutral::Identity), POSE),
+    KeyRow::new(
+        "T_*",
+        Treatment::Reported(Neutral::Identity),
+        "a pose under another name: as T_BS, body from camera, `--body` or `--rig` applies it",
+    ),
     KeyRow::new("sensor_type", Treatment::Ignored, "camera"),
     KeyRow::new("comment", Treatment::Ignored, "free text"),
 ];

@@ -1,11 +1,14 @@
 //! Lens models by the names that several formats share.
 
+use std::f64::consts::TAU;
+
 use camsim_core::lens::{ForeignLensError, foreign_lens};
 use camsim_core::scenario::LensModel;
 
 use serde_json::Value;
 
-use super::document::{KeyProblem, at_most_coefficients, find, numbers};
+use super::document::{KeyProblem, at_most_coefficients, find, numbers, optional_number};
+use super::{CameraFormat, ImportedCamera, camera};
 
 /// Lens model and coefficients in camsim's order, by the name of a model. Radial-tangential coefficients are
 /// in OpenCV's order.
@@ -39,16 +42,14 @@ pub(super) fn lens_by_name(
         other => match foreign_lens(other, &coefficients) {
             Ok(lens) => Ok((lens.model, lens.coefficients)),
             Err(error @ ForeignLensError::Count { .. }) => Err(KeyProblem::new(key, error.to_string())),
-            Err(ForeignLensError::Unknown(_)) => {
-                let full_name =
-                    unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
-                let text = format!(
-                    "is `{model}`{full_name}, which is not supported: radial-tangential (radtan, plumb_bob, \
-                     rational_polynomial), equidistant, omni, ds, eucm, ucm, fov and none can be imported; a lens of \
-                     another model is a table of points (docs/LENSES.md)"
-                );
-                Err(KeyProblem::new(model_key, text))
-            }
+            Err(ForeignLensError::Unknown(_)) => Err(KeyProblem::new(
+                model_key,
+                unsupported_model(
+                    model,
+                    "radial-tangential (radtan, plumb_bob, rational_polynomial), equidistant, omni, ds, eucm, ucm, \
+                     fov and none can be imported; a lens of another model is a table of points (docs/LENSES.md)",
+                ),
+            )),
         },
     }
 }
@@ -80,18 +81,57 @@ pub(super) fn coefficients(
     }
 }
 
-/// Full name of an unsupported model by its normalized short name.
-pub(super) fn unsupported_model_name(normalized: &str) -> Option<&'static str> {
+/// Whether a name is that of a panorama.
+pub(super) fn is_panorama(model: &str) -> bool {
+    let model = model.to_ascii_lowercase();
+    model.contains("spherical") || model.contains("equirect") || model.contains("panoram")
+}
+
+/// What to say of a model that is not imported, and what to do.
+pub(super) fn unsupported_model(model: &str, advice: &str) -> String {
+    if is_panorama(model) {
+        return format!(
+            "is `{model}`, a panorama: write a CAMERA.toml of size_px = [W, H], focal_px = [W / (2 pi), W / (2 pi)] and \
+             lens.model = \"equirectangular\""
+        );
+    }
+    let full_name = unsupported_model_name(model).map_or(String::new(), |name| format!(" ({name})"));
+    format!("is `{model}`{full_name}, which is not supported: {advice}")
+}
+
+/// Full name of an unsupported model by its short name.
+pub(super) fn unsupported_model_name(model: &str) -> Option<&'static str> {
+    let normalized: String =
+        model.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
     let has = |part: &str| normalized.contains(part);
-    match normalized {
+    match normalized.as_str() {
         "unifiedprojection" => Some("unified camera model"),
         _ if has("omni") || has("mirror") => Some("MEI, omnidirectional"),
         _ if has("doublesphere") => Some("double sphere"),
         _ if has("scaramuzza") || has("ocam") => Some("OCamCalib's polynomial"),
         _ if has("ftheta") => Some("f-theta polynomial"),
-        _ if has("spherical") || has("equirect") => Some("panorama"),
+        _ if is_panorama(model) => Some("panorama"),
         _ => None,
     }
+}
+
+/// A panorama whose width is a whole turn. `others` are keys of a lens, which a panorama has not.
+pub(super) fn panorama(
+    format: CameraFormat,
+    value: &Value,
+    (key, model): (&str, &str),
+    size_px: [u32; 2],
+    others: &[&str],
+) -> Result<ImportedCamera, KeyProblem> {
+    for other in others {
+        if optional_number(value, other)?.is_some_and(|number| number != 0.0) {
+            let text = format!("is `{model}`, a panorama, which has no {other}: delete it, or correct {key}");
+            return Err(KeyProblem::new(key, text));
+        }
+    }
+    let [width, height] = size_px.map(f64::from);
+    let centre = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
+    Ok(camera(format, size_px, [width / TAU; 2], centre, LensModel::Equirectangular, Vec::new()))
 }
 
 /// Coefficients `k1 k2 p1 p2 k3 k4 k5 k6`; further ones must be zero.

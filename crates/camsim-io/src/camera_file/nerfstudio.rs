@@ -1,29 +1,48 @@
-//! nerfstudio's `transforms.json`. Its code has the centre of the first pixel at (0.5, 0.5).
+//! nerfstudio's and instant-ngp's `transforms.json`. Their code has the centre of the first pixel at (0.5, 0.5).
+//!
+//! Intrinsics are at the root or, where the root has none, in the frames. Frames with the same values are one
+//! camera.
+
+use std::collections::HashSet;
+use std::f64::consts::PI;
 
 use camsim_core::scenario::LensModel;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use super::document::{Document, KeyProblem, find, number, optional_number, size, word};
+use super::document::{
+    Document, KeyProblem, as_number, find, flag, number, numbers_n, optional_number, size, word,
+};
 use super::key_table::{KeyRow, Neutral, Treatment};
+use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera};
 
 const COEFFICIENT: &str = "coefficient; refused unless zero if camera_model does not have it";
 const POSES: &str = "pictures and poses";
+const OWN: &str = "as that of the root, where the root has none; refused if both differ";
+const OTHER_LENS: &str =
+    "a lens of instant-ngp that is not imported: calibrate with OPENCV or OPENCV_FISHEYE";
+const SHUTTER: &str = "instant-ngp's shares of the motion between two poses: set shutter.readout_ms";
+const MASK: &str = "mask of unused pixels: set photometric.vignette if they are dark";
 
 pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "camera_model",
         Treatment::Applied,
-        "OPENCV (also if missing), OPENCV_FISHEYE, PINHOLE, SIMPLE_PINHOLE; others are refused",
+        "OPENCV (also if missing), OPENCV_FISHEYE, PINHOLE, SIMPLE_PINHOLE, EQUIRECTANGULAR; others are refused",
     ),
-    KeyRow::new("w", Treatment::Applied, "width"),
+    KeyRow::new(
+        "is_fisheye",
+        Treatment::Applied,
+        "true is OPENCV_FISHEYE; refused if camera_model says otherwise",
+    ),
+    KeyRow::new("w", Treatment::Applied, "width; give --size if it is missing"),
     KeyRow::new("h", Treatment::Applied, "height"),
-    KeyRow::new("fl_x", Treatment::Applied, "px"),
+    KeyRow::new("fl_x", Treatment::Applied, "px; from camera_angle_x and w if missing"),
     KeyRow::new("fl_y", Treatment::Applied, "px; fl_x if missing"),
     KeyRow::new(
         "cx",
         Treatment::Applied,
-        "px; half a pixel is subtracted, as its code counts from the corner",
+        "px; half a pixel is subtracted, as its code counts from the corner; the centre if missing",
     ),
     KeyRow::new("cy", Treatment::Applied, "px; half a pixel is subtracted"),
     KeyRow::new("k1", Treatment::Applied, COEFFICIENT),
@@ -32,60 +51,266 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("k4", Treatment::Applied, COEFFICIENT),
     KeyRow::new("p1", Treatment::Applied, COEFFICIENT),
     KeyRow::new("p2", Treatment::Applied, COEFFICIENT),
-    KeyRow::new(
-        "frames.fl_x",
-        Treatment::Refused(Neutral::Never),
-        "each picture has a camera of its own: write one of them to the root of a file",
-    ),
-    KeyRow::new("frames.**", Treatment::Ignored, POSES),
+    KeyRow::new("distortion_params", Treatment::Applied, "k1 k2 k3 k4 p1 p2"),
+    KeyRow::new("camera_angle_x", Treatment::Applied, "radians; named if fl_x is another focal length"),
+    KeyRow::new("camera_angle_y", Treatment::Ignored, "angle of view, which fl_y and h give too"),
+    KeyRow::new("rolling_shutter", Treatment::Reported(Neutral::Zero), SHUTTER),
+    KeyRow::new("ftheta_*", Treatment::Refused(Neutral::Zero), OTHER_LENS),
+    KeyRow::new("latlong", Treatment::Refused(Neutral::Zero), OTHER_LENS),
+    KeyRow::new("frames.camera_model", Treatment::Applied, OWN),
+    KeyRow::new("frames.is_fisheye", Treatment::Applied, OWN),
+    KeyRow::new("frames.w", Treatment::Applied, OWN),
+    KeyRow::new("frames.h", Treatment::Applied, OWN),
+    KeyRow::new("frames.fl_x", Treatment::Applied, OWN),
+    KeyRow::new("frames.fl_y", Treatment::Applied, OWN),
+    KeyRow::new("frames.cx", Treatment::Applied, OWN),
+    KeyRow::new("frames.cy", Treatment::Applied, OWN),
+    KeyRow::new("frames.k1", Treatment::Applied, "coefficient, where the root has none, like the following"),
+    KeyRow::new("frames.k2", Treatment::Applied, OWN),
+    KeyRow::new("frames.k3", Treatment::Applied, OWN),
+    KeyRow::new("frames.k4", Treatment::Applied, OWN),
+    KeyRow::new("frames.p1", Treatment::Applied, OWN),
+    KeyRow::new("frames.p2", Treatment::Applied, OWN),
+    KeyRow::new("frames.distortion_params", Treatment::Applied, OWN),
+    KeyRow::new("frames.camera_angle_x", Treatment::Applied, OWN),
+    KeyRow::new("frames.camera_angle_y", Treatment::Ignored, "angle of view, which fl_y and h give too"),
+    KeyRow::new("frames.rolling_shutter", Treatment::Reported(Neutral::Zero), SHUTTER),
+    KeyRow::new("frames.ftheta_*", Treatment::Refused(Neutral::Zero), OTHER_LENS),
+    KeyRow::new("frames.latlong", Treatment::Refused(Neutral::Zero), OTHER_LENS),
+    KeyRow::new("frames.mask_path", Treatment::Reported(Neutral::Never), MASK),
+    KeyRow::new("frames.*_path", Treatment::Ignored, POSES),
+    KeyRow::new("frames.transform_matrix*", Treatment::Ignored, POSES),
+    KeyRow::new("frames.rotation", Treatment::Ignored, "of NeRF's synthetic scenes"),
+    KeyRow::new("frames.colmap_im_id", Treatment::Ignored, POSES),
+    KeyRow::new("frames.sharpness", Treatment::Ignored, "how sharp a picture is"),
+    KeyRow::new("frames.time*", Treatment::Ignored, "when a picture was taken"),
     KeyRow::new("frames", Treatment::Ignored, POSES),
-    KeyRow::new("camera_angle_*", Treatment::Ignored, "angle of view, which fl_x and w give too"),
     KeyRow::new("aabb_scale", Treatment::Ignored, "a setting of that program"),
+    KeyRow::new("scale", Treatment::Ignored, "a setting of that program"),
+    KeyRow::new("offset", Treatment::Ignored, "a setting of that program"),
     KeyRow::new("applied_*", Treatment::Ignored, POSES),
     KeyRow::new("orientation_override", Treatment::Ignored, POSES),
     KeyRow::new("ply_file_path", Treatment::Ignored, "a file of points"),
     KeyRow::new("*_filenames", Treatment::Ignored, POSES),
 ];
 
-pub(super) fn matches(document: &Document) -> bool {
-    let has = |key: &str| find(&document.value, key).is_some();
-    document.root.is_empty() && has("fl_x") && has("w")
+/// Keys of a camera but those of its distortion.
+const CAMERA: [&str; 9] =
+    ["camera_model", "is_fisheye", "w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x"];
+/// Keys of the distortion: frames have their own only where the root has none of them.
+const DISTORTION: [&str; 7] = ["k1", "k2", "k3", "k4", "p1", "p2", "distortion_params"];
+
+fn camera_keys() -> impl Iterator<Item = &'static str> {
+    CAMERA.into_iter().chain(DISTORTION)
 }
 
-pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
-    let or_zero = |key: &str| optional_number(value, key).map(|number| number.unwrap_or(0.0));
-    let kind = word(value, "camera_model").unwrap_or("OPENCV");
+fn frames(root: &Value) -> &[Value] {
+    root.get("frames").and_then(Value::as_array).map_or(&[], Vec::as_slice)
+}
+
+/// Whether the root has a key, so that those of frames do not count.
+fn is_of_root(root: &Value, key: &str) -> bool {
+    let has = |key: &str| find(root, key).is_some();
+    if DISTORTION.contains(&key) { DISTORTION.iter().any(|other| has(other)) } else { has(key) }
+}
+
+/// A value in which 500 is 500.0.
+fn plain(value: &Value) -> Value {
+    as_number(value).map_or_else(|| value.clone(), Value::from)
+}
+
+/// The camera of a frame, or that of the root if both are the root.
+fn camera_of(root: &Value, frame: &Value) -> Map<String, Value> {
+    let value_of = |key: &'static str| {
+        let from = if is_of_root(root, key) { root } else { frame };
+        find(from, key).map(|value| (key.to_owned(), plain(value)))
+    };
+    camera_keys().filter_map(value_of).collect()
+}
+
+pub(super) fn matches(document: &Document) -> bool {
+    let root = &document.value;
+    let has_focal = |value: &Value| ["fl_x", "camera_angle_x"].iter().any(|key| find(value, key).is_some());
+    let is_complete = find(root, "fl_x").is_some() && find(root, "w").is_some();
+    let has_frames = !frames(root).is_empty();
+    document.root.is_empty()
+        && (is_complete || has_frames && (has_focal(root) || frames(root).iter().any(has_focal)))
+}
+
+/// Whether the root and the frames have no size of pictures.
+pub(super) fn lacks_size(root: &Value) -> bool {
+    std::iter::once(root).chain(frames(root)).all(|value| find(value, "w").is_none())
+}
+
+pub(super) fn entries(document: &Document) -> Result<Vec<CameraEntry<'_>>, KeyProblem> {
+    let root = &document.value;
+    check_frames(root)?;
+    let mut known = HashSet::new();
+    let is_own =
+        |frame: &Value| camera_keys().any(|key| !is_of_root(root, key) && find(frame, key).is_some());
+    let mut cameras: Vec<(usize, &Value)> = frames(root).iter().enumerate().collect();
+    if !cameras.iter().any(|(_, frame)| is_own(frame)) {
+        return Ok(CameraEntry::single(root));
+    }
+    cameras.retain(|(_, frame)| known.insert(Value::Object(camera_of(root, frame)).to_string()));
+    let file_of = |(index, frame): &(usize, &Value)| {
+        word(frame, "file_path").map_or_else(|| format!("frames[{index}]"), str::to_owned)
+    };
+    let files: Vec<String> = cameras.iter().map(file_of).collect();
+    let named = cameras.iter().zip(&files).map(|((index, frame), file)| {
+        let is_only =
+            |folder: &&str| files.iter().filter(|file| folder_of(file) == Some(*folder)).count() == 1;
+        CameraEntry {
+            name: folder_of(file).filter(is_only).unwrap_or(file).to_owned(),
+            aliases: vec![file.clone()],
+            value: frame,
+            roots: vec![format!("frames[{index}]")],
+        }
+    });
+    Ok(named.collect())
+}
+
+/// Name of the folder that a picture is in.
+fn folder_of(file: &str) -> Option<&str> {
+    file.rsplit(['/', '\\']).nth(1)
+}
+
+pub(super) fn import(document: &Document, entry: &CameraEntry<'_>) -> Result<ImportedCamera, KeyProblem> {
+    let root = &document.value;
+    let value = &Value::Object(camera_of(root, entry.value));
+    let kind = kind(value)?;
     let (model, names): (LensModel, &[&str]) = match kind {
         "OPENCV" | "PERSPECTIVE" => (LensModel::BrownConrady, &["k1", "k2", "p1", "p2", "k3"]),
         "OPENCV_FISHEYE" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"]),
         "PINHOLE" | "SIMPLE_PINHOLE" => (LensModel::BrownConrady, &[]),
+        "EQUIRECTANGULAR" => (LensModel::Equirectangular, &[]),
         other => {
-            let text = format!("is `{other}`: OPENCV, OPENCV_FISHEYE and PINHOLE can be imported");
+            let text =
+                format!("is `{other}`: OPENCV, OPENCV_FISHEYE, PINHOLE and EQUIRECTANGULAR can be imported");
             return Err(KeyProblem::new("camera_model", text));
         }
     };
-    for key in ["k1", "k2", "k3", "k4", "p1", "p2"] {
-        if !names.contains(&key) && or_zero(key)? != 0.0 {
-            return Err(KeyProblem::new(
-                key,
-                format!("is not zero, but {kind} has {names:?} only: delete it, or correct camera_model"),
-            ));
+    let mut notes = Vec::new();
+    let coefficients = coefficients(value, kind, names)?;
+    let [width, height] = [sized(value, "w")?, sized(value, "h")?];
+    let size_px = size("w", [width, height])?;
+    let focal_px = match model {
+        // A turn is twice fl_x there, half a turn fl_y.
+        LensModel::Equirectangular => {
+            let or = |key: &str, default: f64| {
+                optional_number(value, key).map(|focal| focal.unwrap_or(default) / PI)
+            };
+            [or("fl_x", 0.5 * width)?, or("fl_y", height)?]
         }
+        _ => focal_px(value, width, &mut notes)?,
+    };
+    let centre = |key: &str, side: f64| optional_number(value, key).map(|c| c.unwrap_or(0.5 * side) - 0.5);
+    let point = [centre("cx", width)?, centre("cy", height)?];
+    if find(value, "cx").is_none() || find(value, "cy").is_none() {
+        notes.push("cx or cy is missing: it is the centre of the picture".to_owned());
     }
-    let fx = number(value, "fl_x")?;
-    let coefficients = names.iter().map(|key| or_zero(key)).collect::<Result<Vec<f64>, _>>()?;
-    let mut imported = camera(
-        CameraFormat::Nerfstudio,
-        size("w", [number(value, "w")?, number(value, "h")?])?,
-        [fx, optional_number(value, "fl_y")?.unwrap_or(fx)],
-        [number(value, "cx")? - 0.5, number(value, "cy")? - 0.5],
-        model,
-        coefficients,
-    );
-    imported.notes.push(
+    let mut imported = camera(CameraFormat::Nerfstudio, size_px, focal_px, point, model, coefficients);
+    notes.push(
         "the principal point was shifted by half a pixel: nerfstudio's code has image corners at integers, whatever \
          its documentation says"
             .to_owned(),
     );
+    imported.notes = notes;
     Ok(imported)
+}
+
+/// The camera model by both keys that name it.
+fn kind(value: &Value) -> Result<&str, KeyProblem> {
+    let fisheye = "OPENCV_FISHEYE";
+    match (word(value, "camera_model"), flag(value, "is_fisheye")?) {
+        (None, Some(true)) => Ok(fisheye),
+        (Some(kind), Some(is_fisheye)) if is_fisheye != (kind == fisheye) => {
+            let text = format!("is {is_fisheye}, but camera_model is {kind}: delete the wrong one");
+            Err(KeyProblem::new("is_fisheye", text))
+        }
+        (kind, _) => Ok(kind.unwrap_or("OPENCV")),
+    }
+}
+
+/// Coefficients of a model by their names; others must be zero.
+fn coefficients(value: &Value, kind: &str, names: &[&str]) -> Result<Vec<f64>, KeyProblem> {
+    let all = ["k1", "k2", "k3", "k4", "p1", "p2"];
+    let mut given = [0.0; 6];
+    for (number, key) in given.iter_mut().zip(all) {
+        *number = optional_number(value, key)?.unwrap_or(0.0);
+    }
+    let list = "distortion_params";
+    if find(value, list).is_some() {
+        if let Some(key) = all.iter().find(|key| find(value, key).is_some()) {
+            return Err(KeyProblem::new(list, format!("and {key} are both given: delete one of the two")));
+        }
+        given = numbers_n(value, list)?;
+    }
+    let of = |key: &&str| all.iter().position(|known| known == key).map_or(0.0, |index| given[index]);
+    if let Some(key) = all.iter().find(|key| !names.contains(key) && of(key) != 0.0) {
+        let has = if names.is_empty() {
+            "no coefficients".to_owned()
+        } else {
+            format!("{} only", names.join(", "))
+        };
+        let other = if kind == "OPENCV_FISHEYE" {
+            "a lens with p1 and p2 is camera_model OPENCV"
+        } else if *key == "k4" {
+            "a fisheye with k1 to k4 is camera_model OPENCV_FISHEYE"
+        } else {
+            "a lens with coefficients is camera_model OPENCV, or OPENCV_FISHEYE"
+        };
+        return Err(KeyProblem::new(*key, format!("is not zero, but {kind} has {has}: {other}")));
+    }
+    Ok(names.iter().map(of).collect())
+}
+
+fn sized(value: &Value, key: &str) -> Result<f64, KeyProblem> {
+    match find(value, key) {
+        Some(_) => number(value, key),
+        None => Err(KeyProblem::new(key, "is missing: add w and h of the pictures, or give --size")),
+    }
+}
+
+/// Focal lengths, from the angle of view if there are none.
+fn focal_px(value: &Value, width: f64, notes: &mut Vec<String>) -> Result<[f64; 2], KeyProblem> {
+    let angle_rad = optional_number(value, "camera_angle_x")?;
+    let by_angle = angle_rad.map(|angle_rad| 0.5 * width / (0.5 * angle_rad).tan());
+    let fx = match (optional_number(value, "fl_x")?, by_angle) {
+        (Some(fx), Some(other)) if (fx / other - 1.0).abs() > 0.01 => {
+            notes.push(format!(
+                "not applied: camera_angle_x, which says a focal length of {other:.1} px: fl_x is {fx}"
+            ));
+            fx
+        }
+        (Some(fx), _) => fx,
+        (None, Some(fx)) => {
+            notes.push(format!("fl_x is missing: {fx:.3} px is from camera_angle_x"));
+            fx
+        }
+        (None, None) => return Err(KeyProblem::new("fl_x", "is missing")),
+    };
+    Ok([fx, optional_number(value, "fl_y")?.unwrap_or(fx)])
+}
+
+/// Refuses frames that state another value than the root: the programs differ in which counts.
+fn check_frames(root: &Value) -> Result<(), KeyProblem> {
+    let differs = |frame: &Value, key: &str| {
+        is_of_root(root, key)
+            && find(frame, key).map(plain).is_some_and(|own| find(root, key).map(plain) != Some(own))
+    };
+    for (index, frame) in frames(root).iter().enumerate() {
+        let keys: Vec<String> = camera_keys()
+            .filter(|key| differs(frame, key))
+            .map(|key| format!("frames[{index}].{key}"))
+            .collect();
+        if !keys.is_empty() {
+            return Err(KeyProblem::new(
+                keys.join(", "),
+                "differ from the root, whose values count in nerfstudio, while the picture's count in instant-ngp: \
+                 delete those of the frames or, if each picture has a camera of its own, those of the root",
+            ));
+        }
+    }
+    Ok(())
 }

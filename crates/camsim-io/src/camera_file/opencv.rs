@@ -5,7 +5,8 @@ use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
 use super::document::{
-    Document, KeyProblem, camera_matrix, find, flag, number, numbers, numbers_n, one_of, size, word,
+    Document, KeyProblem, as_number, camera_matrix, find, flag, number, numbers, numbers_n, one_of, size,
+    word,
 };
 use super::key_table::{KeyRow, Neutral, Treatment};
 use super::selection::CameraEntry;
@@ -313,6 +314,14 @@ pub(super) fn entries(document: &Document) -> Vec<CameraEntry<'_>> {
     matrix_and_coefficients(document).into_iter().map(entry).collect()
 }
 
+/// Refuses matrices without coefficients if those have other names.
+pub(super) fn check_coefficients(entries: &[CameraEntry<'_>]) -> Result<(), KeyProblem> {
+    match entries.iter().find(|entry| entry.roots.len() == 1 && elsewhere(entry.value).is_some()) {
+        Some(entry) => Err(missing_coefficients(entry.value, &entry.name)),
+        None => Ok(()),
+    }
+}
+
 /// Imports a camera. If the user named the format (`is_explicit`), four coefficients without a model are
 /// radial-tangential.
 pub(super) fn import(
@@ -323,12 +332,7 @@ pub(super) fn import(
     let value = entry.value;
     let matrix = entry.name.as_str();
     let (focal_px, principal_point_px) = camera_matrix(value, matrix)?;
-    let key = entry.roots.get(1).ok_or_else(|| {
-        KeyProblem::new(
-            "distortion_coefficients",
-            format!("is missing for {matrix}: add it, as [0, 0, 0, 0, 0] if there is no distortion"),
-        )
-    })?;
+    let key = entry.roots.get(1).ok_or_else(|| missing_coefficients(value, matrix))?;
     // Several lists of one camera must be equal.
     let suffix = MATRICES.iter().find_map(|name| matrix.strip_prefix(name)).unwrap_or_default();
     let names = COEFFICIENTS.map(|name| format!("{name}{suffix}"));
@@ -363,6 +367,63 @@ pub(super) fn import(
         _ => lens_models::radial_tangential_or_prism(key, list)?,
     };
     Ok(camera(format, size_px, focal_px, principal_point_px, lens, list))
+}
+
+/// What to say if no known key has the coefficients of a matrix: those under names of other programs are given as
+/// they are to be written.
+fn missing_coefficients(value: &Value, matrix: &str) -> KeyProblem {
+    let key = "distortion_coefficients";
+    match elsewhere(value) {
+        Some((names, list)) => KeyProblem::new(
+            key,
+            format!(
+                "is missing for {matrix}, and {} have the lens: write `distortion_coefficients: {list:?}` instead of \
+                 them (k1 k2 p1 p2 k3 ...). MATLAB counts cx and cy from 1, and writes sizes as rows, columns",
+                names.join(", ")
+            ),
+        ),
+        None => KeyProblem::new(
+            key,
+            format!("is missing for {matrix}: add it, as [0, 0, 0, 0, 0] if there is no distortion"),
+        ),
+    }
+}
+
+/// Coefficients under one key each, or as radial and tangential ones: the keys, and the list in OpenCV's order.
+pub(super) fn elsewhere(value: &Value) -> Option<(Vec<&str>, Vec<f64>)> {
+    let (mut names, mut k, mut p) = (Vec::new(), vec![0.0; 3], vec![0.0; 2]);
+    for (name, item) in value.as_object()? {
+        let plain = name.to_ascii_lowercase();
+        let is_tangential = plain.contains("tangential");
+        let list = numbers(value, name).unwrap_or_default();
+        if (is_tangential || plain.contains("radial")) && !list.is_empty() {
+            let to = if is_tangential { &mut p } else { &mut k };
+            list.iter().enumerate().for_each(|(index, number)| set(to, index, *number));
+        } else if let (Some(number), Some((kind, index))) = (as_number(item), coefficient(&plain)) {
+            set(if kind == 'p' { &mut p } else { &mut k }, index, number);
+        } else {
+            continue;
+        }
+        names.push(name.as_str());
+    }
+    let rest = k.split_off(3);
+    let mut all = [&k[..2], &p[..2], &k[2..], &rest].concat();
+    // OpenCV has five or eight.
+    all.resize(if all.len() > 5 { all.len().max(8) } else { 5 }, 0.0);
+    (!names.is_empty()).then_some((names, all))
+}
+
+/// `k1` as k, 0; `p2` as p, 1.
+fn coefficient(name: &str) -> Option<(char, usize)> {
+    let (kind, number) = name.split_at_checked(1)?;
+    let index = number.parse::<usize>().ok().filter(|number| (1..=6).contains(number))? - 1;
+    Some((kind.chars().next().filter(|kind| ['k', 'p'].contains(kind))?, index))
+}
+
+/// Sets a number of a list, which grows as needed.
+fn set(list: &mut Vec<f64>, index: usize, number: f64) {
+    list.resize(list.len().max(index + 1), 0.0);
+    list[index] = number;
 }
 
 /// The mirror parameter of OpenCV's module omnidir, as a number or a matrix of one; zero is none.
@@ -405,14 +466,9 @@ fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, KeyProblem>
         let plain: String =
             word.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
         let has = |parts: &[&str]| parts.iter().any(|part| plain.contains(part));
-        if let Some(other) = lens_models::unsupported_model_name(&plain) {
-            return Err(KeyProblem::new(
-                key,
-                format!(
-                    "is `{word}` ({other}), which is not supported: calibrate with OpenCV's calib3d or \
-                     fisheye model"
-                ),
-            ));
+        if lens_models::unsupported_model_name(word).is_some() {
+            let advice = "calibrate with OpenCV's calib3d or fisheye model";
+            return Err(KeyProblem::new(key, lens_models::unsupported_model(word, advice)));
         } else if has(&["fisheye", "equidist", "kannala", "kb4"]) {
             set(key, LensModel::KannalaBrandt)?;
         } else if has(&["radtan", "radialtang", "plumb", "brown", "rational", "standard"]) {

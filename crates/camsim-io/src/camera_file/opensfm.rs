@@ -10,14 +10,16 @@ use super::selection::CameraEntry;
 use super::{CameraFormat, ImportedCamera, camera, lens_models};
 
 const FRACTION: &str = "fraction of the longer side";
+/// Names of all coefficients.
+const LENS_KEYS: [&str; 12] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s0", "s1", "s2", "s3"];
 
 /// Keys of a camera, relative to its name.
 pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new(
         "projection_type",
         Treatment::Applied,
-        "perspective (also if missing), simple_radial, radial, brown, fisheye, fisheye_opencv; others are \
-         refused",
+        "perspective (also if missing), simple_radial, radial, brown, fisheye, fisheye_opencv, spherical and \
+         equirectangular (a whole turn); others are refused",
     ),
     KeyRow::new("width", Treatment::Applied, "required; OpenSfM's camera database has none: give --size"),
     KeyRow::new("height", Treatment::Applied, "required"),
@@ -41,6 +43,7 @@ pub(super) const KEYS: &[KeyRow] = &[
 
 fn is_camera(value: &Value) -> bool {
     ["focal", "focal_x"].iter().any(|key| value.get(key).is_some_and(Value::is_number))
+        || word(value, "projection_type").is_some()
 }
 
 /// The map of cameras by name, and its path.
@@ -147,17 +150,22 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
         "brown" => (LensModel::BrownConrady, &["k1", "k2", "p1", "p2", "k3"], "k1, k2, p1, p2, k3"),
         "fisheye" => (LensModel::KannalaBrandt, &["k1", "k2"], "k1, k2"),
         "fisheye_opencv" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"], "k1 to k4"),
-        other => {
-            let full_name =
-                lens_models::unsupported_model_name(other).map_or(String::new(), |name| format!(" ({name})"));
-            let text = format!(
-                "is `{other}`{full_name}, which is not supported: reconstruct with perspective, brown or \
-                 fisheye_opencv"
+        "spherical" | "equirectangular" => {
+            let others = [&LENS_KEYS[..], &["focal", "focal_x", "focal_y", "c_x", "c_y"]].concat();
+            return lens_models::panorama(
+                CameraFormat::OpenSfm,
+                value,
+                ("projection_type", kind),
+                size_px,
+                &others,
             );
-            return Err(KeyProblem::new("projection_type", text));
+        }
+        other => {
+            let advice = "reconstruct with perspective, brown or fisheye_opencv";
+            return Err(KeyProblem::new("projection_type", lens_models::unsupported_model(other, advice)));
         }
     };
-    for key in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s0", "s1", "s2", "s3"] {
+    for key in LENS_KEYS {
         if !coefficients.contains(&key) && or_zero(key)? != 0.0 {
             return Err(KeyProblem::new(
                 key,

@@ -7,7 +7,7 @@ use camsim_core::{
 use glam::{DMat3, DQuat, DVec3};
 use serde_json::Value;
 
-use super::document::{Document, KeyProblem, find, number, numbers, optional_number};
+use super::document::{Document, KeyProblem, find, number, numbers, one_of, optional_number};
 use super::format::CameraFormat;
 use super::selection::CameraEntry;
 use crate::calibration::{
@@ -47,6 +47,8 @@ enum Placement {
 #[derive(Debug, Default)]
 pub(super) struct Extrinsics {
     placement: Option<Placement>,
+    /// Path of the key that gave the pose in the body.
+    pose_key: String,
     /// What is added to stamps of the camera to get those of the inertial sensor, seconds.
     shift_s: Option<f64>,
     /// Paths of the keys that were read.
@@ -91,10 +93,25 @@ impl Extrinsics {
         key: &str,
         is_inverse: bool,
     ) -> Result<(), KeyProblem> {
-        if self.placement.is_none() && find(value, key).is_some() {
-            let pose = self.matrix(value, prefix, key)?;
-            self.placement = Some(Placement::InBody(if is_inverse { pose.inverse() } else { pose }));
+        if find(value, key).is_none() {
+            return Ok(());
         }
+        let pose = self.matrix(value, prefix, key)?;
+        self.place(format!("{prefix}{key}"), if is_inverse { pose.inverse() } else { pose })
+    }
+
+    /// Takes a pose in the body. A file that states another one already is refused.
+    fn place(&mut self, key: String, pose: Rigid) -> Result<(), KeyProblem> {
+        if let Some(Placement::InBody(before)) = self.placement {
+            return match difference(&before, &pose) {
+                None => Ok(()),
+                Some(by) => Err(KeyProblem::new(
+                    key,
+                    format!("is another pose than {}, by {by}: delete the wrong one", self.pose_key),
+                )),
+            };
+        }
+        (self.placement, self.pose_key) = (Some(Placement::InBody(pose)), key);
         Ok(())
     }
 
@@ -198,13 +215,9 @@ impl Extrinsics {
             return Ok(());
         };
         let computed = own.inverse().of(&before);
-        let shift_m = (stated.translation_m - computed.translation_m).length();
-        let angle_rad = stated.rotation.angle_between(computed.rotation);
-        if shift_m > 1e-3 || angle_rad > 1e-3 {
+        if let Some(by) = difference(&stated, &computed) {
             self.notes.push(format!(
-                "{prefix}T_cn_cnm1 differs from the poses of both cameras to the IMU by {shift_m:.4} m and {:.3} \
-                 degrees: the latter are taken",
-                angle_rad.to_degrees()
+                "{prefix}T_cn_cnm1 differs from the poses of both cameras to the IMU by {by}: the latter are taken"
             ));
         }
         Ok(())
@@ -215,7 +228,7 @@ impl Extrinsics {
         self.shift(root, "", "td")?;
         self.in_body(root, "", "body_T_cam0", false)?;
         let (turn, shift) = ("extrinsicRotation", "extrinsicTranslation");
-        if self.placement.is_none() && find(root, turn).is_some() && find(root, shift).is_some() {
+        if find(root, turn).is_some() && find(root, shift).is_some() {
             let (r, t) = (numbers(root, turn)?, numbers(root, shift)?);
             if r.len() != 9 || t.len() != 3 {
                 return Err(KeyProblem::new(
@@ -225,8 +238,8 @@ impl Extrinsics {
             }
             let rows: Vec<f64> = (0..3).flat_map(|k| [r[3 * k], r[3 * k + 1], r[3 * k + 2], t[k]]).collect();
             let (pose, _) = rigid(&rows).map_err(|message| KeyProblem::new(turn, message))?;
-            self.placement = Some(Placement::InBody(pose));
             self.applied.extend([turn.to_owned(), shift.to_owned()]);
+            self.place(turn.to_owned(), pose)?;
         }
         Ok(())
     }
@@ -259,7 +272,7 @@ impl Extrinsics {
     fn orb_slam(&mut self, root: &Value, name: &str) -> Result<(), KeyProblem> {
         self.in_body(root, "", "IMU.T_b_c1", false)?;
         self.in_body(root, "", "Tbc", false)?;
-        let pair = ["Stereo.T_c1_c2", "Tlr"].into_iter().find(|key| find(root, key).is_some());
+        let pair = one_of(root, &["Stereo.T_c1_c2", "Tlr"])?;
         if name != "Camera2" {
             if self.placement.is_none() && pair.is_some() {
                 self.placement = Some(Placement::InFirst(Rigid::IDENTITY));
@@ -307,6 +320,14 @@ fn set_mount(spec: &mut CameraSpec, body_from_camera: &Rigid) {
     let tolerance = 16.0 * f64::EPSILON * shift_m.length();
     spec.mount.angles_deg = mount_angles_deg(body_from_camera.rotation);
     spec.mount.offset_m = shift_m.to_array().map(|metres| shortest(metres, tolerance));
+}
+
+/// By how much two poses differ, beyond the rounding of files.
+fn difference(a: &Rigid, b: &Rigid) -> Option<String> {
+    let shift_m = (a.translation_m - b.translation_m).length();
+    let angle_rad = a.rotation.angle_between(b.rotation);
+    (shift_m > 1e-3 || angle_rad > 1e-3)
+        .then(|| format!("{shift_m:.4} m and {:.3} degrees", angle_rad.to_degrees()))
 }
 
 /// A rigid motion of 12 or 16 numbers in rows, and how far its axes are from a rotation's.

@@ -4,6 +4,9 @@ use serde_json::Value;
 
 use super::document::{Document, KeyProblem};
 
+/// Most names in a message.
+const MOST_NAMES: usize = 12;
+
 /// A camera in a file.
 #[derive(Debug)]
 pub(super) struct CameraEntry<'a> {
@@ -54,8 +57,10 @@ impl<'a> CameraEntry<'a> {
 /// Index of the camera with a name, or of the only camera.
 pub(super) fn select(entries: &[CameraEntry<'_>], name: Option<&str>) -> Result<usize, KeyProblem> {
     let names = || {
-        let names: Vec<String> = entries.iter().map(|entry| format!("`{}`", entry.name)).collect();
-        names.join(", ")
+        let first: Vec<String> =
+            entries.iter().take(MOST_NAMES).map(|entry| format!("`{}`", entry.name)).collect();
+        let rest = entries.len().saturating_sub(MOST_NAMES);
+        first.join(", ") + &if rest > 0 { format!(" and {rest} more") } else { String::new() }
     };
     let Some(name) = name else {
         return match entries.len() {
@@ -64,7 +69,7 @@ pub(super) fn select(entries: &[CameraEntry<'_>], name: Option<&str>) -> Result<
             count => Err(KeyProblem::new(
                 "cameras",
                 format!(
-                    "there are {count} ({}): select one with `--camera {}`",
+                    "there are {count} ({}): select one with `--camera {}`, or all with `--rig`",
                     names(),
                     quoted(&entries[0].name)
                 ),

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::document::{Document, KeyProblem, find};
-use super::{CameraFormat, opencv, opensfm};
+use super::{CameraFormat, nerfstudio, opencv, opensfm};
 
 /// Adds a size to a document that has none. Whether the size that is read is this one is checked later.
 pub(super) fn complete(document: &mut Document, format: CameraFormat, [width, height]: [u32; 2]) {
@@ -21,6 +21,9 @@ pub(super) fn complete(document: &mut Document, format: CameraFormat, [width, he
             if opencv::image_size(&document.value).is_err() =>
         {
             add(&mut document.value, ["image_width", "image_height"]);
+        }
+        CameraFormat::Nerfstudio if nerfstudio::lacks_size(&document.value) => {
+            add(&mut document.value, ["w", "h"]);
         }
         CameraFormat::OpenSfm => {
             for camera in opensfm::cameras_mut(document) {

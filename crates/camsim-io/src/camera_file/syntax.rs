@@ -5,17 +5,20 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde_json::{Map, Value};
 
 use super::document::{Document, SyntaxProblem};
-use super::{colmap, ros_ini};
+use super::{colmap, other_text, ros_ini};
 
 impl Document {
     /// Detects the syntax by the first characters: `<` is XML, `{` JSON, `[image]` ROS's `.ini`, a camera
-    /// line COLMAP; else it is YAML.
+    /// line COLMAP; files of other programs in `other_text`; else it is YAML.
     pub(crate) fn parse(text: &str) -> Result<Self, SyntaxProblem> {
         if ros_ini::matches_text(text) {
             return ros_ini::parse(text);
         }
         if colmap::matches_text(text) {
             return colmap::parse(text);
+        }
+        if let Some(document) = other_text::parse(text) {
+            return Ok(document);
         }
         match text.trim_start().chars().next() {
             Some('<') => Self::parse_xml(text),

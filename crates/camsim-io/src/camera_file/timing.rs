@@ -6,10 +6,8 @@ use serde_json::Value;
 use super::ImportedCamera;
 use super::document::{KeyProblem, as_flag, as_number};
 use super::key_table::{KeyRow, Leaf, TableLeaves, Treatment, row_of};
-use crate::calibration::text::shortest;
+use crate::{calibration::text::shortest, unlikely_camera::LONGEST_READOUT_MS};
 
-/// Longest plausible readout (sensors need 1 to 190 ms), milliseconds.
-const MAX_READOUT_MS: f64 = 250.0;
 /// Shortest plausible readout where the unit is not stated, milliseconds.
 const MIN_READOUT_MS: f64 = 0.5;
 
@@ -256,17 +254,17 @@ fn readout_ms(
     }
     let units = [("s", 1e3), ("ms", 1.0), ("us", 1e-3), ("ns", 1e-6)];
     let plausible =
-        units.iter().find(|(_, unit)| (MIN_READOUT_MS..=MAX_READOUT_MS).contains(&(readout * unit)));
+        units.iter().find(|(_, unit)| (MIN_READOUT_MS..=LONGEST_READOUT_MS).contains(&(readout * unit)));
     let (name, unit) = plausible.ok_or_else(|| {
         let text = format!(
             "is {} without a unit, and in none of s, ms, us, ns a readout of {MIN_READOUT_MS} to \
-             {MAX_READOUT_MS} ms: rename it to readout_ms or line_delay_ns",
+             {LONGEST_READOUT_MS} ms: rename it to readout_ms or line_delay_ns",
             leaf.value
         );
         KeyProblem::new(&leaf.path, text)
     })?;
     notes.push(format!(
-        "{} is read in {name}, the only unit with a readout of {MIN_READOUT_MS} to {MAX_READOUT_MS} ms",
+        "{} is read in {name}, the only unit with a readout of {MIN_READOUT_MS} to {LONGEST_READOUT_MS} ms",
         leaf.path
     ));
     Ok(readout * unit)

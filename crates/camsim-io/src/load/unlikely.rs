@@ -1,60 +1,16 @@
 //! Warnings of legal values of a camera that are probably mistakes.
 
-use std::f64::consts::TAU;
-
 use camsim_core::{
     imaging::sensor_levels,
-    scenario::{CameraSpec, LensModel, Reset},
+    scenario::{CameraSpec, Reset},
 };
 
-/// Degrees across within which the field of view of a flat lens is usual.
-const USUAL_FIELD_DEG: std::ops::RangeInclusive<f64> = 0.1..=150.0;
-/// A turn and some pixels of rounding.
-const MOST_TURNS: f64 = 1.05;
+use crate::unlikely_camera;
 
-/// Warns of a unit that is probably wrong, and of keys that have no effect or clip the picture.
+/// Warns of values that are probably mistakes, and of keys that have no effect or clip the picture.
 pub(super) fn unlikely_values(camera: &CameraSpec) -> Vec<String> {
-    [field_warning(camera), noise_warning(camera), full_well_warning(camera), reset_warning(camera)]
-        .into_iter()
-        .flatten()
-        .collect()
-}
-
-/// A focal length that was given in millimetres, or in pixels of another size.
-fn field_warning(camera: &CameraSpec) -> Option<String> {
-    if !camera.zoom.is_empty() {
-        return None;
-    }
-    let (width, focal_px) = (f64::from(camera.size_px[0]), camera.focal_px[0]);
-    let across_rad = match camera.lens.model {
-        LensModel::Pinhole | LensModel::BrownConrady | LensModel::BrownConradyPrism => {
-            2.0 * (0.5 * width / focal_px).atan()
-        }
-        _ => width / focal_px,
-    };
-    let across_deg = across_rad.to_degrees();
-    let is_usual = match camera.lens.model {
-        LensModel::Pinhole | LensModel::BrownConrady | LensModel::BrownConradyPrism => {
-            USUAL_FIELD_DEG.contains(&across_deg)
-        }
-        LensModel::Equirectangular => {
-            across_deg >= *USUAL_FIELD_DEG.start() && across_rad <= MOST_TURNS * TAU
-        }
-        _ => across_deg >= *USUAL_FIELD_DEG.start(),
-    };
-    let remedy = match camera.lens.model {
-        LensModel::Equirectangular => "the width of a whole turn is 2 pi focal_px",
-        _ => "focal_px is in pixels, f_mm / pixel_um * 1000",
-    };
-    (!is_usual).then(|| {
-        format!(
-            "camera.focal_px = [{}, {}] makes a field of view of {} degrees across {width} pixels: {remedy}",
-            camera.focal_px[0],
-            camera.focal_px[1],
-            // Three digits.
-            if across_deg < 1.0 { format!("{across_deg:.2e}") } else { format!("{across_deg:.0}") }
-        )
-    })
+    let doubts = unlikely_camera::doubts(camera).into_iter().map(|doubt| format!("camera.{doubt}"));
+    doubts.chain(noise_warning(camera)).chain(full_well_warning(camera)).chain(reset_warning(camera)).collect()
 }
 
 /// Noise of more than the range from black to white, as where 8-bit values were meant.
@@ -97,38 +53,9 @@ fn reset_warning(camera: &CameraSpec) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use camsim_core::scenario::{AutoExposureSpec, ImageSensorSpec, LensSpec, SensorModel, ShutterSpec};
+    use camsim_core::scenario::{AutoExposureSpec, ImageSensorSpec, SensorModel, ShutterSpec};
 
     use super::*;
-
-    fn lens(model: LensModel, focal_px: f64) -> CameraSpec {
-        let lens = LensSpec { model, coefficients: Vec::new() };
-        CameraSpec { lens, focal_px: [focal_px; 2], ..CameraSpec::default() }
-    }
-
-    #[test]
-    fn a_focal_length_of_another_unit_is_named_with_its_field() {
-        let field = |model, focal_px| field_warning(&lens(model, focal_px)).unwrap_or_default();
-        // 2 atan(320 / 3.6) and 2 atan(320 / 1e6).
-        let wide = field(LensModel::Pinhole, 3.6);
-        assert!(wide.contains("focal_px = [3.6, 3.6]") && wide.contains("179 degrees across 640"), "{wide}");
-        assert!(wide.contains("focal_px is in pixels"), "{wide}");
-        let narrow = field(LensModel::BrownConrady, 1e6);
-        assert!(narrow.contains("3.67e-2 degrees"), "{narrow}");
-        assert!(field(LensModel::Pinhole, 0.0028).contains("180 degrees"));
-        // 640 / 5 radians.
-        let turned = field(LensModel::Equirectangular, 5.0);
-        assert!(turned.contains("7334 degrees") && turned.contains("2 pi"), "{turned}");
-        for (model, focal_px) in [
-            (LensModel::Pinhole, 500.0),
-            (LensModel::Pinhole, 90.0),
-            (LensModel::BrownConrady, 1e5),
-            (LensModel::KannalaBrandt, 100.0),
-            (LensModel::Equirectangular, 640.0 / TAU),
-        ] {
-            assert_eq!(field(model, focal_px), "", "{model:?} {focal_px}");
-        }
-    }
 
     #[test]
     fn noise_of_8_bit_values_is_said() {

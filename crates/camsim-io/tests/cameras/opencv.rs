@@ -115,7 +115,7 @@ fn implausible_and_unknown_values_are_reported() {
             "image_width: 480\nimage_height: 640",
             "whether it is rotated",
         ),
-        ("401, 240", "900, 240", "factor of two"),
+        ("401, 240", "900, 240", "differs by 125 %"),
         ("[400, 0, 320, 0, 401", "[50, 0, 320, 0, 50", "162 degrees"),
         ("image_width", "Readout_time_ms: 12\nimage_width", "the file has no frame rate"),
         (

@@ -3,7 +3,7 @@
 use camsim_core::scenario::{DatasetFormat, LensModel};
 
 use super::{Sample, exported, names, sample, text};
-use crate::camera_file::import_camera_as;
+use crate::camera_file::{ImportOptions, import_camera_as, import_camera_with};
 
 const LENS: &str = "[camera]\nsize_px = [6, 4]\nfocal_px = [5.0, 5.5]\nprincipal_point_px = [2.25, 1.75]\nfps = 10.0\n\
                     [camera.mount]\nangles_deg = [0.0, -90.0, 0.0]\noffset_m = [0.5, 0.0, 0.25]\n\
@@ -67,6 +67,13 @@ fn calibrations_read_back_as_the_camera() {
         assert_eq!(camera.lens.model, LensModel::BrownConrady);
         assert_eq!(camera.lens.coefficients[..4], [-0.25, 0.06, 0.001, -0.002], "{}", path.display());
     }
+    let tum = Sample::with(LENS, "");
+    tum.write(&["color_png", "depth", "rows"]);
+    exported(&tum, DatasetFormat::Tum).unwrap();
+    let options = ImportOptions { size_px: Some([6, 4]), ..ImportOptions::default() };
+    let camera = import_camera_with(&tum.out().join("calibration.txt"), &options).unwrap().spec;
+    assert_eq!((camera.focal_px, camera.principal_point_px), ([5.0, 5.5], Some([2.25, 1.75])));
+    assert_eq!(camera.lens.coefficients, [-0.25, 0.06, 0.001, -0.002]);
     let chain = text(&kalibr.out().join("camchain.yaml"));
     assert!(chain.contains("  line_delay: 0.002\n") && chain.contains("distortion_model: radtan"), "{chain}");
     assert!(names(&kalibr.out()).contains(&"cam0/0000000001100000000.png".to_owned()));

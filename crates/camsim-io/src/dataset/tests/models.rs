@@ -4,6 +4,7 @@ use camsim_core::scenario::DatasetFormat;
 use glam::{DQuat, DVec3};
 
 use super::{Sample, exported, names, sample::FRAMES, text};
+use crate::camera_file::{ImportOptions, import_rig};
 
 const POINTS: [[f64; 3]; 3] = [[40.0, 21.0, -29.0], [41.0, 19.5, -31.0], [50.0, 20.0, -30.0]];
 
@@ -215,4 +216,27 @@ fn nerfstudio_has_opengl_axes() {
     let wanted = [[1.0, 0.0, 0.0, 20.0], [0.0, 0.0, -1.0, 10.0], [0.0, 1.0, 0.0, 30.0], [0.0, 0.0, 0.0, 1.0]];
     let same = |row: &Vec<f64>, wanted: &[f64; 4]| row.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12);
     assert!(matrix.iter().zip(&wanted).all(|(row, wanted)| same(row, wanted)), "{matrix:?}");
+}
+
+/// Cameras of a rig have their intrinsics in the frames, and names by their folders.
+#[test]
+fn nerfstudio_reads_back_as_the_rig() {
+    let sample = Sample::with(
+        "[camera]\nsize_px = [6, 4]\nfocal_px = [5.0, 5.5]\nprincipal_point_px = [2.25, 1.75]\nfps = 10.0\n\
+         [camera.lens]\nmodel = \"brown-conrady\"\ncoefficients = [-0.25, 0.06, 0.001, -0.002]\n",
+        "",
+    );
+    sample.write_rig(&["color_png"]);
+    exported(&sample, DatasetFormat::Nerfstudio).unwrap();
+    let path = sample.out().join("transforms.json");
+    // Both are alike.
+    let rig = import_rig(&path, &ImportOptions::default()).unwrap();
+    let [camera] = &rig.cameras[..] else { panic!("{} cameras", rig.cameras.len()) };
+    assert_eq!((camera.focal_px, camera.principal_point_px), ([5.0, 5.5], Some([2.25, 1.75])));
+    assert_eq!(camera.lens.coefficients, [-0.25, 0.06, 0.001, -0.002]);
+    let other = text(&path).replacen("\"fl_x\": 5.0", "\"fl_x\": 5.25", 4);
+    std::fs::write(&path, other).unwrap();
+    let rig = import_rig(&path, &ImportOptions::default()).unwrap();
+    let found: Vec<_> = rig.cameras.iter().map(|camera| (&camera.name[..], camera.focal_px[0])).collect();
+    assert_eq!(found, [("cam0", 5.25), ("cam1", 5.0)]);
 }
