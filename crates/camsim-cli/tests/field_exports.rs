@@ -64,7 +64,7 @@ fn samples_before_zero_are_not_lost() {
     let base = tempfile::tempdir().unwrap();
     let frames = ["--frames", "0..2"];
     let (out, err) = exported(base.path(), "43-mcap-drops-negative-stamps", "mcap", &frames);
-    assert!(err.contains("output.epoch_ns = 1000000000"), "{err}");
+    assert!(err.contains("output.epoch_ns = 2000000000"), "{err}");
     let bytes = fs::read(out.join("camsim.mcap")).unwrap();
     let inertial = mcap::MessageStream::new(&bytes)
         .unwrap()
@@ -73,7 +73,7 @@ fn samples_before_zero_are_not_lost() {
     let rows = read(out.join("camsim/sensors/imu0.csv")).lines().count() - 1;
     assert_eq!(inertial, rows);
     let (out, err) = exported(base.path(), "43-mcap-drops-negative-stamps", "kalibr", &frames);
-    assert!(err.contains("output.epoch_ns = 1000000000"), "{err}");
+    assert!(err.contains("output.epoch_ns = 2000000000"), "{err}");
     let table = read(out.join("imu0.csv"));
     assert_eq!(table.lines().count() - 1, rows);
     assert!(table.lines().all(|line| !line.starts_with('-')), "{table}");

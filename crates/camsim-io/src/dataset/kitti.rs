@@ -27,7 +27,8 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     for view in &views {
         view.require(job.name(), &["color_png"])?;
     }
-    for (i, sequence) in sequences(&views)?.iter().enumerate() {
+    let sequences = sequences(&views)?;
+    for (i, sequence) in sequences.iter().enumerate() {
         let cameras: Vec<&RunCamera> = sequence.iter().map(|camera| &views[*camera]).collect();
         write_odometry(job, i, &cameras)?;
         for ((camera, view), kind) in sequence.iter().zip(cameras).zip(COLOR) {
@@ -42,8 +43,8 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
             }
         }
     }
-    let notes: Vec<String> = scale.note().into_iter().chain(stereo::note(&views)?).collect();
-    job.target.text("README.md", &page(job, &views, &notes)?)?;
+    let notes: Vec<String> = scale.note().into_iter().chain(single(&sequences)).collect();
+    job.target.text("README.md", &page(job, &views, &sequences, &notes))?;
     Ok(notes)
 }
 
@@ -66,6 +67,19 @@ fn sequences(views: &[RunCamera]) -> Result<Vec<Vec<usize>>, DatasetError> {
         sequences.push(vec![camera]);
     }
     Ok(sequences)
+}
+
+/// A note on cameras of a rig that are not half of a pair.
+fn single(sequences: &[Vec<usize>]) -> Option<String> {
+    let alone = sequences.iter().filter(|sequence| sequence.len() == 1);
+    let alone: Vec<String> = alone.map(|sequence| format!("cam{}", sequence[0])).collect();
+    (sequences.len() > 1 && !alone.is_empty()).then(|| {
+        format!(
+            "{}: sequences of their own, without a baseline in P1 and P3. A pair has the same size, focal length and \
+             principal point, parallel axes, one camera to the right of the other, and pictures at the same times",
+            alone.join(", ")
+        )
+    })
 }
 
 /// The camera without distortion: itself, or a twin.
@@ -149,7 +163,7 @@ fn write_flow(
     })
 }
 
-fn page(job: &ExportJob<'_>, views: &[RunCamera], notes: &[String]) -> Result<String, DatasetError> {
+fn page(job: &ExportJob<'_>, views: &[RunCamera], sequences: &[Vec<usize>], notes: &[String]) -> String {
     let mut page = Page::new("KITTI: odometry, depth, flow", job);
     page.line("camera", OPTICAL)
         .line(
@@ -176,11 +190,11 @@ fn page(job: &ExportJob<'_>, views: &[RunCamera], notes: &[String]) -> Result<St
             "64 d + 32768, right and down; third sample 1 = known. `flow_noc`: points that the other picture shows; \
              `flow_occ`: hidden ones and those outside, too. To the time of the row that sees the point",
         );
-    for (i, sequence) in sequences(views)?.iter().enumerate() {
+    for (i, sequence) in sequences.iter().enumerate() {
         page.line(&format!("shutter of sequence {i:02}"), &timing(&views[sequence[0]]));
     }
     notes.iter().for_each(|note| {
         page.note(note);
     });
-    Ok(page.text().to_owned())
+    page.text().to_owned()
 }

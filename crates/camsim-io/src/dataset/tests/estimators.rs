@@ -211,6 +211,14 @@ fn a_stereo_rig_has_its_baseline() {
         });
         let report = exported(&sample, DatasetFormat::Mcap).unwrap();
         assert_eq!(report.notes.len(), notes, "{:?}", report.notes);
+        let kitti = Sample::new("");
+        kitti.write_rig(&["color_png"]);
+        fs::copy(sample.run().join("rig.toml"), kitti.run().join("rig.toml")).unwrap();
+        fs::copy(sample.run().join("right/run.json"), kitti.run().join("right/run.json")).unwrap();
+        let is_pair = mount == "[0.0,0.25,0.0]";
+        let report = exported(&kitti, DatasetFormat::Kitti).unwrap();
+        assert_eq!(report.notes.is_empty(), is_pair, "{:?}", report.notes);
+        assert_eq!(kitti.out().join("sequences/01/calib.txt").is_file(), !is_pair);
         let bytes = fs::read(sample.out().join("camsim.mcap")).unwrap();
         for (i, wanted) in offsets.into_iter().enumerate() {
             let topic = format!("/cam{i}/camera_info");
