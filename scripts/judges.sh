@@ -1,5 +1,5 @@
 #!/bin/sh
-# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV, DuckDB. OpenCV also calibrates three lenses from pictures.
+# Has the readers of other programs judge the exports: evo, pycolmap, rosbags, mcap, OpenCV, PyYAML, DuckDB. OpenCV also calibrates three lenses from pictures.
 # Renders small scenes, and makes a Python environment with these packages (a download of about 300 MB, once).
 #   CAMSIM=target/release/camsim   the program; without it, it is built
 #   JUDGES_VENV=DIR                the environment; default target/judges-venv
@@ -18,7 +18,7 @@ if ! [ -x "$venv/bin/python" ]; then
     say "making $venv"
     "$python" -m venv "$venv" || { say "JUDGES SKIPPED: python3 has no venv (apt-get install python3-venv)"; rm -rf "$venv"; exit 0; }
 fi
-if ! "$venv/bin/python" -c "import cv2, duckdb, evo, mcap, numpy, OpenEXR, pycolmap, rosbags" 2>/dev/null; then
+if ! "$venv/bin/python" -c "import cv2, duckdb, evo, mcap, numpy, OpenEXR, pycolmap, rosbags, yaml" 2>/dev/null; then
     say "installing the readers into $venv"
     "$venv/bin/pip" install --quiet --requirement scripts/judges/requirements.txt ||
         { say "JUDGES SKIPPED: the packages of scripts/judges/requirements.txt could not be installed"; exit 0; }
@@ -43,10 +43,12 @@ render gs '["tum", "euroc", "kitti", "colmap", "mcap", "flo"]'
 render rs '["tum", "euroc", "kitti"]'
 render fisheye '["colmap", "mcap"]'
 render rig '["colmap", "webdataset"]'
+render stereo '["euroc", "kalibr"]'
 judge trajectories "$dir/gs/run" "$dir/rs/run"
 judge colmap "$dir/gs/run" "$dir/fisheye/run" "$dir/rig/run"
 judge bag "$dir/gs/run" "$dir/fisheye/run"
 judge pictures "$dir/gs/run"
+judge settings "$dir/stereo/run"
 calib="$dir/calibrations"
 "$venv/bin/python" scripts/judges/calibrations.py make "$calib"
 for camera in radtan rational prism fisheye; do

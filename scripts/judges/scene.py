@@ -2,7 +2,8 @@
 """Writes the scenes that the judges look at into a folder: python3 scene.py DIR
 
 A camera flies before a chessboard: gs.toml with a global shutter and OpenCV's lens, fisheye.toml with OpenCV's fisheye lens, rs.toml with a
-rolling shutter, exposure, delay and a lens of eight coefficients, rig.toml with two cameras of which one takes every second picture.
+rolling shutter, exposure, delay and a lens of eight coefficients, rig.toml with two cameras of which one takes every second picture, stereo.toml
+with two fisheye cameras, an IMU without random walks and a satellite receiver.
 """
 
 import math
@@ -78,6 +79,39 @@ def rig():
     return text.replace("[scene.board]", RIGHT + "[scene.board]")
 
 
+# A second camera like the first one, and sensors.
+SENSORS = """\
+[[cameras]]
+name = "right"
+size_px = [320, 240]
+focal_px = [264.0, 265.5]
+principal_point_px = [161.3, 118.2]
+fps = 10.0
+[cameras.mount]
+angles_deg = [1.0, -2.0, -5.0]
+offset_m = [0.1, 0.15, 0.03]
+[cameras.lens]
+model = "kannala-brandt"
+coefficients = [-0.02, 0.005, -0.001, 0.0002]
+[[imu]]
+name = "imu0"
+rate_hz = 200
+axes = "flu"
+clock_offset_ms = 2.0
+gyro = { noise_density = 1.7e-4 }
+accel = { noise_density = 2e-3 }
+[[gnss]]
+name = "gnss0"
+"""
+
+
+def stereo():
+    text = SCENE.format(**{**KINDS["fisheye"], "end_s": 1.4})
+    text = text.replace('log = "log.csv"', 'log = "log.csv"\norigin = [47.0, 8.0, 400.0]')
+    text = text.replace("[camera]", '[[cameras]]\nname = "left"').replace("[camera.", "[cameras.")
+    return text.replace("[scene.board]", SENSORS + "[scene.board]")
+
+
 def main(folder):
     folder.mkdir(parents=True, exist_ok=True)
     rows = ["t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg"]
@@ -90,6 +124,7 @@ def main(folder):
     for name, keys in KINDS.items():
         (folder / f"{name}.toml").write_text(SCENE.format(**keys))
     (folder / "rig.toml").write_text(rig())
+    (folder / "stereo.toml").write_text(stereo())
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 //! Output folders of `camsim render` in the layouts of other programs.
 //!
-//! An export is a pure function of an output folder: pictures are linked or copied as they are, tables are
-//! turned into the axes, quaternion orders, pixel origins and clocks that the reader expects. A page
+//! An export is a pure function of an output folder: pictures are linked or copied as they are where readers take
+//! alpha and 16 bits, and else encoded again; tables are turned into the axes, quaternion orders, pixel origins and clocks that the reader expects. A page
 //! `README.md` in the export says which.
 //!
 //! | module | writes |
@@ -47,12 +47,17 @@ mod imu;
 mod kalibr;
 mod kitti;
 mod nerfstudio;
+mod openvins;
 mod page;
 mod pairs;
+mod pictures;
+mod receivers;
 mod record;
 mod requirements;
 mod run_folder;
 mod settings;
+mod stamps;
+mod stereo;
 mod target;
 mod tum;
 mod twins;
@@ -101,6 +106,8 @@ pub struct ExportOptions {
     /// Integers per metre in depth pictures; `None`: what the layout is known for, or less where depths would
     /// not fit.
     pub depth_per_metre: Option<f64>,
+    /// Whether estimators get colour, not grey.
+    pub color: bool,
     /// Whether an export of another run in the folder is removed; otherwise it is an error.
     pub replace: bool,
 }
@@ -133,6 +140,8 @@ struct ExportJob<'a> {
     options: &'a ExportOptions,
     /// Whether the folder has parts of this very export.
     keeps: bool,
+    /// What the user should know, whatever the layout.
+    notes: Vec<String>,
 }
 
 impl ExportJob<'_> {
@@ -189,8 +198,10 @@ pub fn export(
     };
     crate::write::remove_all_temporaries(folder);
     record.write(folder, None)?;
-    let job = ExportJob { run, format, target: Target { folder, watch }, options, keeps };
-    let notes = match format {
+    let (run, shifted) = stamps::fitted(run, format)?;
+    let notes: Vec<String> = shifted.into_iter().collect();
+    let job = ExportJob { run: &run, format, target: Target { folder, watch }, options, keeps, notes };
+    let own = match format {
         DatasetFormat::Euroc => euroc::write(&job)?,
         DatasetFormat::Tum => tum::write(&job)?,
         DatasetFormat::Kitti => kitti::write(&job)?,
@@ -203,6 +214,7 @@ pub fn export(
         DatasetFormat::Mcap => bag::write(&job)?,
         DatasetFormat::Webdataset => webdataset::write(&job)?,
     };
+    let notes = [job.notes, own].concat();
     record.write(folder, Some(&notes))?;
     Ok(ExportReport { notes, ..report })
 }

@@ -53,6 +53,7 @@ mod encode;
 mod exr_file;
 mod frame_table;
 mod frames;
+mod numbers;
 mod picture;
 mod png_file;
 mod raw_picture;
@@ -71,13 +72,16 @@ pub use encode::{luminance, srgb_from_linear, srgb8};
 pub(crate) use exr_file::encode as encode_exr;
 pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
+pub use numbers::Number;
 pub use picture::write_picture;
+pub(crate) use png_file::encode as encode_png;
 pub use png_file::{contact_sheet, palette_rgb8};
 pub use rig::{RIG_TOML, rig_names, rig_toml, write_rig};
 pub use sensors::{
     BAROMETER_COLUMNS, GNSS_COLUMNS, IMU_COLUMNS, MAGNETOMETER_COLUMNS, SENSORS_FOLDER, SensorSummary,
     kalibr_yaml, write_sensors,
 };
+pub(crate) use sensors::{KalibrFigures, imu_yaml};
 pub use tables::{
     CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
     TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,

@@ -21,8 +21,8 @@ use crate::{
 /// Write frames in the layout of another program
 ///
 /// Takes an output folder of `camsim render`, or a scenario, which is rendered first, with the channels, formats
-/// and twins that the layout needs, into DIR/camsim. Pictures are linked or copied, not encoded again. Pixel
-/// origins, axes, quaternion orders, clocks and units are turned to what the layout's readers expect; DIR/README.md
+/// and twins that the layout needs, into DIR/camsim. Pictures are linked or copied where the layout's readers take
+/// them as they are, and else written as grey or RGB without alpha. Pixel origins, axes, quaternion orders, clocks and units are turned to what the layout's readers expect; DIR/README.md
 /// says how. The same command again completes an export that was stopped. `output.datasets = ["euroc"]` in a
 /// scenario does this at the end of `camsim render`. docs/DATASETS.md describes the layouts.
 #[derive(Debug, clap::Args)]
@@ -31,7 +31,8 @@ Examples:
   camsim export flight.toml --as euroc -o euroc        for ORB-SLAM3, OpenVINS, VINS-Fusion, Basalt
   camsim export out --as mcap -o bag                   frames that are rendered: for ROS 2, Foxglove, rerun
   camsim export flight.toml --as colmap -o model --set output.tracks.points=terrain
-  camsim export out --as tum -o tum --depth-per-metre 100")]
+  camsim export out --as tum -o tum --depth-per-metre 100
+  camsim export out --as kalibr -o left --camera left  one camera of several")]
 pub struct ExportArgs {
     /// Output folder of camsim render, or a scenario (TOML)
     source: PathBuf,
@@ -44,6 +45,12 @@ pub struct ExportArgs {
     /// Frames of a scenario to render: 7, 10..20 (without 20) ... [default: all]
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
+    /// Cameras of a rig, by their names [default: all]
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    camera: Vec<String>,
+    /// Pictures in colour where the layout has them in grey (euroc, kalibr)
+    #[arg(long)]
+    color: bool,
     #[command(flatten)]
     changes: Changes,
     /// Variation of a scenario with [randomize] [default: without what is drawn]
@@ -75,8 +82,12 @@ pub fn run(args: &ExportArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     } else {
         render_source(args, console)?
     };
-    let options = ExportOptions { depth_per_metre: args.depth_per_metre, replace: false };
-    let summary = export_folder(&folder, args.format, &args.output, &options, console)?;
+    let options = ExportOptions { depth_per_metre: args.depth_per_metre, color: args.color, replace: false };
+    let mut run = RunFolder::open(&folder).or_bad_input()?;
+    if !args.camera.is_empty() {
+        run = run.of_cameras(&args.camera).or_bad_input()?;
+    }
+    let summary = export_run(&run, args.format, &args.output, &options, console)?;
     if console.is_quiet() { Ok(()) } else { Ok(console.line(summary)?) }
 }
 
@@ -96,7 +107,8 @@ fn refuse_scenario_options(args: &ExportArgs) -> Result<(), Failure> {
 /// Renders what the layout needs; returns the folder.
 fn render_source(args: &ExportArgs, console: &mut Console<'_>) -> Result<PathBuf, Failure> {
     let folder = args.output.join("camsim");
-    let rendered = RenderArgs::for_export(args.frames.clone(), args.changes.clone(), args.backend);
+    let rendered =
+        RenderArgs::for_export(args.frames.clone(), args.camera.clone(), args.changes.clone(), args.backend);
     let rig = inputs::read_changed_rig(&args.source, &args.changes, args.variation, console)?;
     render(&rendered, rig, &folder, Some(args.format), console)?;
     Ok(folder)
@@ -133,10 +145,11 @@ pub fn export_datasets(
     has_pipe: bool,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
-    let options = ExportOptions { depth_per_metre: None, replace: true };
+    let options = ExportOptions { replace: true, ..ExportOptions::default() };
     for &format in formats {
         let target = folder.join("datasets").join(format.name());
-        let summary = export_folder(folder, format, &target, &options, console)?;
+        let run = RunFolder::open(folder).or_bad_input()?;
+        let summary = export_run(&run, format, &target, &options, console)?;
         // Standard output may have the frames.
         if has_pipe {
             console.note(summary);
@@ -147,25 +160,30 @@ pub fn export_datasets(
     Ok(())
 }
 
-/// Exports an output folder, with a progress bar; returns a summary.
-fn export_folder(
-    source: &Path,
+/// Exports a run, with a progress bar; returns a summary.
+fn export_run(
+    run: &RunFolder,
     format: DatasetFormat,
     folder: &Path,
     options: &ExportOptions,
     console: &mut Console<'_>,
 ) -> Result<String, Failure> {
-    let run = RunFolder::open(source).or_bad_input()?;
     if !run.is_finished {
-        console
-            .warn(format_args!("{} is not finished: the frames that it has are exported", source.display()));
+        let place = run.path.display();
+        console.warn(format_args!("{place} is not finished: the frames that it has are exported"));
+    }
+    if !run.empty.is_empty() {
+        console.warn(format_args!(
+            "no frames of {}: the export is of the other cameras alone",
+            run.empty.join(", ")
+        ));
     }
     let _lock = Lock::take(folder)?;
     let bar = frames_bar(run.frames(), console.is_quiet());
     bar.set_message(format!("{} ", format.name()));
     let stop = interrupt::watch();
     let watch = Watch { advance: &|| bar.inc(1), is_stopped: &|| stop.is_asked() };
-    let exported = export(&run, format, folder, options, &watch);
+    let exported = export(run, format, folder, options, &watch);
     bar.finish_and_clear();
     let report = match exported {
         Ok(report) => report,

@@ -135,8 +135,13 @@ impl RenderBackend {
 
 impl RenderArgs {
     /// What `camsim export` renders: what is missing in its folder.
-    pub fn for_export(frames: Option<FrameList>, changes: Changes, backend: Option<RenderBackend>) -> Self {
-        Self { frames, changes, backend, resume: true, ..Self::default() }
+    pub fn for_export(
+        frames: Option<FrameList>,
+        camera: Vec<String>,
+        changes: Changes,
+        backend: Option<RenderBackend>,
+    ) -> Self {
+        Self { frames, camera, changes, backend, resume: true, ..Self::default() }
     }
 }
 

@@ -7,7 +7,7 @@ use camsim_core::scenario::LensModel;
 use super::{
     Calibration, CalibrationError, ImuReference,
     lens_names::no_such_lens,
-    text::{opencv_matrix_n, real},
+    text::{Element, opencv_matrix, real},
 };
 
 /// The file of one camera.
@@ -90,8 +90,13 @@ pub(crate) fn settings(camera: &Calibration, imu: &ImuReference) -> Result<Strin
         "{}estimate_extrinsic: 0\n{}{}# stamp + td is the time of the image's centre on the IMU's clock\ntd: {}\n\
          # seconds from the first row to the last\nrolling_shutter: {}\nrolling_shutter_tr: {}\n",
         file(name, camera)?,
-        opencv_matrix_n("extrinsicRotation", [3, 3], &rotation),
-        opencv_matrix_n("extrinsicTranslation", [3, 1], &imu_from_camera.translation_m.to_array()),
+        opencv_matrix("extrinsicRotation", [3, 3], Element::Double, &rotation),
+        opencv_matrix(
+            "extrinsicTranslation",
+            [3, 1],
+            Element::Double,
+            &imu_from_camera.translation_m.to_array()
+        ),
         real(camera.stamp_to_centre_s() + imu.clock_offset_s),
         u8::from(readout_s > 0.0),
         real(readout_s)

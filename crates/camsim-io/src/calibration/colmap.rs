@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use camsim_core::scenario::LensModel;
 
 use super::{Calibration, CalibrationError, lens_names::no_such_lens};
+use crate::write::Number;
 
 /// The file.
 ///
@@ -22,7 +23,7 @@ pub(crate) fn cameras_txt(cameras: &[Calibration]) -> Result<String, Calibration
 
 /// A line of `cameras.txt`.
 pub(crate) fn camera_line(id: u32, model: &str, [width, height]: [u32; 2], parameters: &[f64]) -> String {
-    let parameters = parameters.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let parameters = parameters.iter().map(|value| Number(*value).to_string()).collect::<Vec<_>>().join(" ");
     format!("{id} {model} {width} {height} {parameters}")
 }
 

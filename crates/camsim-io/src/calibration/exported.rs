@@ -8,7 +8,7 @@ use super::{
     axes::{Rigid, flu_from_frd},
     basalt, camodocal, colmap, euroc,
     kalibr::{PoseKey, chain_yaml},
-    nerfstudio, opencv, orb_slam, ros, stmap,
+    lens_names, nerfstudio, opencv, orb_slam, ros, stmap,
 };
 
 /// Formats of calibrations that can be written.
@@ -229,6 +229,9 @@ fn notes(cameras: &[Calibration], format: CalibrationFormat) -> Result<Vec<Strin
                 -1e3 * camera.stamp_to_centre_s()
             ));
         }
+    }
+    if format == CalibrationFormat::Euroc {
+        notes.extend(cameras.iter().filter_map(|camera| lens_names::euroc_note(camera, camera.label())));
     }
     if format.has_poses() {
         notes.push("poses refer to the platform as x forward, y left, z up".to_owned());

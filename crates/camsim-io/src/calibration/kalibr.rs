@@ -22,7 +22,7 @@ pub(crate) enum PoseKey {
 /// The chain of cameras, from an inertial sensor if there is one.
 ///
 /// # Errors
-/// Kalibr does not have the lens.
+/// Kalibr does not have the lens; or OpenVINS, which knows a part of Kalibr's.
 pub(crate) fn chain_yaml(
     cameras: &[Calibration],
     imu: Option<&ImuReference>,
@@ -33,6 +33,9 @@ pub(crate) fn chain_yaml(
         .to_owned();
     for (i, camera) in cameras.iter().enumerate() {
         let (projection, mut intrinsics, model, coefficients) = lens_of(camera)?;
+        if key == PoseKey::ImuCam && projection != "pinhole" {
+            return Err(lens_names::no_such_lens(camera, "OpenVINS"));
+        }
         let lens = &camera.intrinsics;
         let ([fx, fy], [cx, cy], [w, h]) = (lens.focal_px, lens.principal_px, lens.size_px);
         intrinsics.extend([fx, fy, cx, cy]);
@@ -44,13 +47,13 @@ pub(crate) fn chain_yaml(
                 PoseKey::CamImu => ("T_cam_imu", camera_from_imu),
                 PoseKey::ImuCam => ("T_imu_cam", camera_from_imu.inverse()),
             };
-            let rows = matrix_rows(&pose.matrix(), "  ");
+            let rows = matrix_rows(&pose.matrix());
             let shift_s = camera.stamp_to_centre_s() + imu.clock_offset_s;
             let _ = writeln!(text, "  {name}:\n{rows}  timeshift_cam_imu: {}", real(shift_s));
         }
         if let Some(before) = i.checked_sub(1).map(|before| &cameras[before]) {
             let pose = camera_from_body.of(&before.body_from_camera());
-            let _ = write!(text, "  T_cn_cnm1:\n{}", matrix_rows(&pose.matrix(), "  "));
+            let _ = write!(text, "  T_cn_cnm1:\n{}", matrix_rows(&pose.matrix()));
         }
         let others: Vec<String> = (0..cameras.len()).filter(|k| *k != i).map(|k| k.to_string()).collect();
         let _ = write!(

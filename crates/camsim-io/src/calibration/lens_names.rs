@@ -28,6 +28,9 @@ impl Family {
     }
 }
 
+/// OKVIS's name for eight coefficients.
+const EIGHT: &str = "radialtangential8";
+
 /// Name and coefficients of the lens in a format, as short as the format allows.
 ///
 /// # Errors
@@ -59,11 +62,19 @@ pub(crate) fn lens(
         Family::OpenCv => five.or(eight).map(named("radtan")),
         Family::Ros => five.map(named("plumb_bob")).or_else(|| eight.map(named("rational_polynomial"))),
         Family::Kalibr => four.map(named("radtan")),
-        Family::Euroc => {
-            four.map(named("radial-tangential")).or_else(|| eight.map(named("radialtangential8")))
-        }
+        Family::Euroc => four.map(named("radial-tangential")).or_else(|| eight.map(named(EIGHT))),
     };
     found.ok_or_else(|| no_such_lens(camera, family.title()))
+}
+
+/// What readers of `sensor.yaml` should know of a lens whose name is not one of EuRoC's own.
+pub(crate) fn euroc_note(camera: &Calibration, label: &str) -> Option<String> {
+    let (name, _) = lens(Family::Euroc, camera).ok().filter(|(name, _)| *name == EIGHT)?;
+    Some(format!(
+        "sensor.yaml of {label} has the lens as {name} (k1 k2 p1 p2 k3 k4 k5 k6), which OKVIS knows; readers that know \
+         EuRoC's own radial-tangential alone have no place for k3: give them a twin without lens ([[output.twin]] lens \
+         = false), or a lens of k1 k2 p1 p2"
+    ))
 }
 
 /// The error of a format without the lens.

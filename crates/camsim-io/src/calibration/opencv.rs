@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::{
     Calibration, CalibrationError,
     lens_names::{self, Family},
-    text::opencv_matrix_n,
+    text::{Element, opencv_matrix},
 };
 
 /// The file of one camera.
@@ -18,8 +18,10 @@ pub(crate) fn file(camera: &Calibration) -> Result<String, CalibrationError> {
          fisheye_model: {}\n",
         u8::from(model == "fisheye")
     );
-    text += &opencv_matrix_n("camera_matrix", [3, 3], &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]);
-    text += &opencv_matrix_n("distortion_coefficients", [1, coefficients.len()], &coefficients);
+    text +=
+        &opencv_matrix("camera_matrix", [3, 3], Element::Double, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]);
+    text +=
+        &opencv_matrix("distortion_coefficients", [1, coefficients.len()], Element::Double, &coefficients);
     let _ = writeln!(text, "# {}", order(model, coefficients.len()));
     Ok(text)
 }

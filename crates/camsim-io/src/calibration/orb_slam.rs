@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use super::{
     Calibration, CalibrationError, ImuReference, Intrinsics,
+    axes::Rigid,
     lens_names::no_such_lens,
-    text::{opencv_matrix, real},
+    text::{Element, opencv_matrix, real},
 };
 
 /// The cameras, one or two, with the pose of the first in the inertial sensor.
@@ -24,6 +25,13 @@ pub(crate) fn cameras(
             let _ = writeln!(text, "Camera.type: \"{}\"", kind(camera));
         }
         text += &camera_keys(i + 1, camera)?;
+        if cameras.len() == 2 && camera.intrinsics.equidistant().is_some() {
+            // Columns in which points of the other camera are looked for: all of them.
+            let last = camera.intrinsics.size_px[0].saturating_sub(1);
+            let number = i + 1;
+            let _ =
+                writeln!(text, "Camera{number}.overlappingBegin: 0\nCamera{number}.overlappingEnd: {last}");
+        }
     }
     let Some(first) = cameras.first() else { return Ok(text) };
     let [width, height] = first.intrinsics.size_px;
@@ -35,13 +43,18 @@ pub(crate) fn cameras(
     if let [left, right] = cameras {
         let left_from_right = left.body_from_camera().inverse().of(&right.body_from_camera());
         text += "\nStereo.ThDepth: 60.0\n";
-        text += &opencv_matrix("Stereo.T_c1_c2", &left_from_right.matrix());
+        text += &pose("Stereo.T_c1_c2", &left_from_right);
     }
     if let Some(imu) = imu {
         let b_from_camera = imu.body_from_imu.inverse().of(&first.body_from_camera());
-        let _ = write!(text, "\n{}", opencv_matrix("IMU.T_b_c1", &b_from_camera.matrix()));
+        let _ = write!(text, "\n{}", pose("IMU.T_b_c1", &b_from_camera));
     }
     Ok(text)
+}
+
+/// A pose, whose elements its reader takes for floats.
+fn pose(name: &str, pose: &Rigid) -> String {
+    opencv_matrix(name, [4, 4], Element::Float, pose.matrix().as_flattened())
 }
 
 /// What it has once has to be the same for both.

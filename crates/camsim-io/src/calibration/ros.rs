@@ -21,7 +21,7 @@ pub(crate) fn file(camera: &Calibration) -> Result<String, CalibrationError> {
         matrix("camera_matrix", 3, &camera_matrix(lens)),
         matrix("distortion_coefficients", 1, &d),
         matrix("rectification_matrix", 3, &NO_ROTATION),
-        matrix("projection_matrix", 3, &projection_matrix(lens)),
+        matrix("projection_matrix", 3, &projection_matrix(lens, [0.0; 2])),
     ))
 }
 
@@ -34,8 +34,11 @@ pub(crate) fn camera_matrix(lens: &Intrinsics) -> [f64; 9] {
     [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
 }
 
-/// P of pictures that are rectified with the same camera matrix.
-pub(crate) fn projection_matrix(lens: &Intrinsics) -> [f64; 12] {
+/// P of pictures that are rectified with the same camera matrix, of a camera that is so many metres to the right of
+/// and below the first one of its pair.
+pub(crate) fn projection_matrix(lens: &Intrinsics, [right_m, down_m]: [f64; 2]) -> [f64; 12] {
     let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.principal_px);
-    [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    // Without the sign of a zero.
+    let [right_px, down_px] = [0.0 - fx * right_m, 0.0 - fy * down_m];
+    [fx, 0.0, cx, right_px, 0.0, fy, cy, down_px, 0.0, 0.0, 1.0, 0.0]
 }

@@ -18,20 +18,29 @@ pub(crate) fn matrix_list(rows: &[[f64; 4]; 4]) -> String {
     list(rows.as_flattened())
 }
 
-/// Rows of a matrix in YAML, as a list of lists.
-pub(crate) fn matrix_rows(rows: &[[f64; 4]; 4], indent: &str) -> String {
-    rows.iter().map(|row| format!("{indent}- {}\n", list(row))).collect()
+/// Rows of a matrix below a key with an indent of two, as a list of lists. OpenCV's parser wants the items of a list
+/// further to the right than their key.
+pub(crate) fn matrix_rows<const N: usize>(rows: &[[f64; N]]) -> String {
+    rows.iter().map(|row| format!("    - {}\n", list(row))).collect()
+}
+
+/// Type of the elements of a matrix in OpenCV's YAML. Programs that ask for elements of the other type read nonsense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Element {
+    Float,
+    Double,
 }
 
 /// A matrix in OpenCV's YAML.
-pub(crate) fn opencv_matrix(name: &str, rows: &[[f64; 4]; 4]) -> String {
-    opencv_matrix_n(name, [4, 4], rows.as_flattened())
-}
-
-/// A matrix of any size in OpenCV's YAML.
-pub(crate) fn opencv_matrix_n(name: &str, [rows, columns]: [usize; 2], data: &[f64]) -> String {
+pub(crate) fn opencv_matrix(
+    name: &str,
+    [rows, columns]: [usize; 2],
+    element: Element,
+    data: &[f64],
+) -> String {
+    let dt = if element == Element::Float { "f" } else { "d" };
     let data = list(data);
-    format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {data}\n")
+    format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: {dt}\n   data: {data}\n")
 }
 
 /// Scalar first, not negative: q and -q are the same rotation.

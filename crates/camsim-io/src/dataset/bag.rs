@@ -12,9 +12,10 @@ use serde::Serialize;
 
 use super::{
     DatasetError, ExportJob,
-    euroc::{check_stamps, timing},
+    euroc::timing,
     imu::imus,
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    stereo,
 };
 
 mod messages;
@@ -77,8 +78,12 @@ impl<'w> Bag<'w> {
         t_ns: i64,
         message: &T,
     ) -> Result<(), DatasetError> {
-        // A bag has no time before 0; pictures there were refused.
-        let Ok(time) = u64::try_from(t_ns) else { return Ok(()) };
+        let time = u64::try_from(t_ns).map_err(|_| {
+            DatasetError::Refused(format!(
+                "{topic} has a message at {t_ns} ns, and MCAP has no times before 0: set output.stamps = \"zero\" with an \
+                 output.epoch_ns such as 1000000000"
+            ))
+        })?;
         if !self.channels.contains_key(topic) {
             let schema =
                 self.writer.add_schema(kind, "ros2msg", schemas::text(kind).as_bytes()).map_err(failed)?;
@@ -104,7 +109,6 @@ impl<'w> Bag<'w> {
 pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     for camera in &job.run.cameras {
         camera.require(job.name(), &["color_png"])?;
-        check_stamps(job.name(), camera)?;
     }
     let imus = imus(job.run)?;
     job.target.stream(FILE, &mut |out| {
@@ -114,13 +118,13 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
             sources.push(Box::new(sensors::ImuMessages::new(i, imu)?));
         }
         for (i, receiver) in sensors::receivers(job.run)?.into_iter().enumerate() {
-            sources.push(Box::new(sensors::Fixes::new(i, &receiver)?));
+            sources.push(Box::new(sensors::Fixes::new(i, &receiver, job.run.shift_ns())?));
         }
         for (i, camera) in job.run.cameras.iter().enumerate() {
             sources.push(Box::new(pictures::Pictures::new(job, i, camera)?));
         }
         let mut bag = Bag::create(out)?;
-        let first_ns = sources.iter().filter_map(|source| source.next_ns()).filter(|ns| *ns >= 0).min();
+        let first_ns = sources.iter().filter_map(|source| source.next_ns()).min();
         let fixed = TransformMessage { transforms: fixed(job, &imus, first_ns.unwrap_or(0)) };
         bag.send("/tf_static", "tf2_msgs/msg/TFMessage", first_ns.unwrap_or(0), &fixed)?;
         loop {
@@ -132,8 +136,14 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
         bag.writer.finish().map_err(failed)?;
         Ok(())
     })?;
-    let notes: Vec<String> = imus.first().and_then(|imu| imu.begins_late(job.run)).into_iter().collect();
-    job.target.text("README.md", &page(job))?;
+    for (i, camera) in job.run.cameras.iter().enumerate() {
+        if let Some(mask) = super::pictures::mask(camera)? {
+            mask.write(job, &format!("mask_cam{i}.png"), 255)?;
+        }
+    }
+    let late = imus.first().and_then(|imu| imu.begins_late(job.run));
+    let notes: Vec<String> = late.into_iter().chain(stereo::note(&job.run.cameras)?).collect();
+    job.target.text("README.md", &page(job, &notes))?;
     Ok(notes)
 }
 
@@ -155,8 +165,8 @@ fn fixed<'a>(job: &ExportJob<'_>, imus: &[super::imu::ImuSensor], t_ns: i64) -> 
         .collect()
 }
 
-fn page(job: &ExportJob<'_>) -> String {
-    let mut page = Page::new(&format!("MCAP with messages of ROS 2: `{FILE}`"), job.run);
+fn page(job: &ExportJob<'_>, notes: &[String]) -> String {
+    let mut page = Page::new(&format!("MCAP with messages of ROS 2: `{FILE}`"), job);
     page.line("`map`", WORLD)
         .line("`base_link`", "the platform, x forward, y left, z up; camsim's own is forward, right, down")
         .line("`camN`", &format!("optical axes: {OPTICAL}"))
@@ -165,9 +175,14 @@ fn page(job: &ExportJob<'_>) -> String {
         .line(
             "`/camN/camera_info`",
             "`plumb_bob` (k1 k2 p1 p2 k3), `rational_polynomial` (k1 k2 p1 p2 k3 k4 k5 k6) or `equidistant` (k1 to k4), \
-             coefficients as they are; no rectification",
+             coefficients as they are. R is the identity and P has the same focal lengths; of a rectified pair the right \
+             (lower) camera has P[3] = -fx b (P[7] = -fy b)",
         )
-        .line("`/camN/image_raw/compressed`", "the PNG as it was written")
+        .line(
+            "`/camN/image_raw/compressed`",
+            "PNG without alpha, of as many bits as the run's; `mask_camN.png` beside the bag is 0 where the lens shows \
+             nothing",
+        )
         .line("`/camN/depth/image_raw`", "32FC1, planar z in metres, 0 = none (with the channel depth)")
         .line("`/imuN`", "as measured, in the sensor's axes; no orientation; covariances are the white noise's")
         .line("`/gnssN/fix`", "WGS-84, height above the ellipsoid")
@@ -181,5 +196,8 @@ fn page(job: &ExportJob<'_>) -> String {
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("time of cam{i}"), &timing(camera));
     }
+    notes.iter().for_each(|note| {
+        page.note(note);
+    });
     page.text().to_owned()
 }

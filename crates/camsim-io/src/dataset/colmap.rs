@@ -61,7 +61,7 @@ fn notes(job: &ExportJob<'_>, model: &Model) -> Vec<String> {
 }
 
 fn page(job: &ExportJob<'_>, notes: &[String]) -> String {
-    let mut page = Page::new("COLMAP model", job.run);
+    let mut page = Page::new("COLMAP model", job);
     page.line("world", WORLD)
         .line("camera", OPTICAL)
         .line("poses", "camera from world: x_cam = R x + t, at the mid-exposure of the image's centre")

@@ -10,11 +10,17 @@ use super::{
     axes::{Rigid, enu, enu_from_ned},
     imu::{ImuSensor, body_from_b, imus},
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    pictures::{self, Samples},
+    receivers,
     run_folder::RunCamera,
     settings,
+    stamps::name_ns,
     text::{matrix_list, real, wxyz},
 };
-use crate::calibration::euroc::sensor_yaml;
+use crate::{
+    calibration::{euroc::sensor_yaml, lens_names},
+    write::Number,
+};
 
 /// Writes the export; returns notes.
 pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
@@ -23,28 +29,17 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     let mut notes = Vec::new();
     for (i, camera) in job.run.cameras.iter().enumerate() {
         camera.require(job.name(), &["color_png"])?;
-        check_stamps(job.name(), camera)?;
         write_camera(job, i, camera, &body_from_b)?;
+        notes.extend(lens_names::euroc_note(&camera.calibration()?, &format!("cam{i}")));
     }
     for (i, imu) in imus.iter().enumerate() {
         write_imu(job, i, imu, &body_from_b)?;
     }
+    let receivers = receivers::write(job, &body_from_b)?;
     write_truth(job, &body_from_b, imus.first())?;
     notes.extend(settings::write(job, &imus, &body_from_b)?);
-    job.target.text("README.md", &page(job, imus.first(), &notes))?;
+    job.target.text("README.md", &page(job, imus.first(), &receivers, &notes))?;
     Ok(notes)
-}
-
-/// Refuses stamps that cannot be names of files.
-pub(super) fn check_stamps(format: &str, camera: &RunCamera) -> Result<(), DatasetError> {
-    match camera.frames.iter().find(|frame| frame.stamp_ns < 0) {
-        Some(frame) => Err(DatasetError::Refused(format!(
-            "frame {} has the stamp {} ns, and {format} has no stamps before 0: set output.stamps = \"zero\" with an \
-             output.epoch_ns such as 1000000000",
-            frame.number, frame.stamp_ns
-        ))),
-        None => Ok(()),
-    }
 }
 
 fn write_camera(
@@ -56,25 +51,30 @@ fn write_camera(
     let calibration = camera.calibration()?;
     let b_from_camera = body_from_b.inverse().of(&camera.body_from_camera());
     let name = |file: &str| format!("mav0/cam{i}/{file}");
+    let samples = Samples::of_estimators(job);
     job.each_frame(camera, |frame| {
-        job.target.link(&camera.file(frame, "color_png"), &name(&format!("data/{}.png", frame.stamp_ns)))
+        pictures::put(job, camera, frame, samples, &name(&format!("data/{}.png", name_ns(frame.stamp_ns))))
     })?;
+    if let Some(mask) = pictures::mask(camera)? {
+        mask.write(job, &name("mask.png"), 255)?;
+    }
     job.target.text(&name("sensor.yaml"), &sensor_yaml(&calibration, &b_from_camera)?)?;
     job.target.stream(&name("data.csv"), &mut |out| {
         writeln!(out, "#timestamp [ns],filename")?;
-        camera
-            .frames
-            .iter()
-            .try_for_each(|frame| Ok(writeln!(out, "{},{}.png", frame.stamp_ns, frame.stamp_ns)?))
+        camera.frames.iter().try_for_each(|frame| {
+            // Some readers make names of pictures from the first column.
+            let stamp = name_ns(frame.stamp_ns);
+            Ok(writeln!(out, "{stamp},{stamp}.png")?)
+        })
     })?;
     job.target.stream(&name("exposure.csv"), &mut |out| {
         writeln!(out, "#timestamp [ns],exposure time[ns]")?;
         camera.frames.iter().try_for_each(|frame| {
-            Ok(writeln!(out, "{},{}", frame.stamp_ns, (frame.exposure_ms * 1e6).round())?)
+            Ok(writeln!(out, "{},{}", name_ns(frame.stamp_ns), (frame.exposure_ms * 1e6).round())?)
         })
     })?;
     job.target.stream(&format!("settings/times_cam{i}.txt"), &mut |out| {
-        camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{}", frame.stamp_ns)?))
+        camera.frames.iter().try_for_each(|frame| Ok(writeln!(out, "{}", name_ns(frame.stamp_ns))?))
     })
 }
 
@@ -93,8 +93,8 @@ fn write_imu(
              [m s^-2],a_RS_S_z [m s^-2]"
         )?;
         while let Some(row) = rows.next_row()? {
-            let [w, a] = [row.gyro_rad_s, row.acc_m_s2];
-            writeln!(out, "{},{},{},{},{},{},{}", row.t_ns, w.x, w.y, w.z, a.x, a.y, a.z)?;
+            write!(out, "{}", row.t_ns)?;
+            write_cells(out, &[row.gyro_rad_s, row.acc_m_s2].map(|v| v.to_array()).concat())?;
         }
         Ok(())
     })?;
@@ -105,12 +105,27 @@ fn write_imu(
          accelerometer_random_walk: {}\n",
         matrix_list(&b_from_imu.matrix()),
         real(imu.rate_hz),
-        real(imu.gyro_noise),
-        real(imu.gyro_walk),
-        real(imu.acc_noise),
-        real(imu.acc_walk)
+        real(imu.noise.gyroscope_noise_density),
+        real(imu.noise.gyroscope_random_walk),
+        real(imu.noise.accelerometer_noise_density),
+        real(imu.noise.accelerometer_random_walk)
     );
     job.target.text(&format!("mav0/imu{i}/sensor.yaml"), &yaml)
+}
+
+/// Ends a line with numbers, each with a comma before it.
+fn write_cells(out: &mut impl Write, values: &[f64]) -> Result<(), DatasetError> {
+    values.iter().try_for_each(|value| write!(out, ",{}", Number(*value)))?;
+    Ok(writeln!(out)?)
+}
+
+/// The clock of estimates: that of the IMU, or of the first camera where there is none; how much it is ahead of the
+/// run's, nanoseconds.
+fn truth_clock(job: &ExportJob<'_>, imu: Option<&ImuSensor>) -> (&'static str, i64) {
+    match imu {
+        Some(imu) => ("imu0", imu.clock_offset_ns()),
+        None => ("cam0", job.run.cameras[0].spec.clock_offset_ns()),
+    }
 }
 
 /// The motion of B: position, attitude, velocity and biases.
@@ -119,6 +134,7 @@ fn write_truth(
     body_from_b: &Rigid,
     imu: Option<&ImuSensor>,
 ) -> Result<(), DatasetError> {
+    let (_, ahead_ns) = truth_clock(job, imu);
     let mut biases = imu.map(ImuSensor::biases).transpose()?;
     let (mut rows, body_from_b) = match imu.filter(|imu| imu.shakes) {
         Some(imu) => (imu.states()?, &Rigid::IDENTITY),
@@ -141,13 +157,10 @@ fn write_truth(
                 Some(biases) => biases.at(state.t_ns)?,
                 None => [DVec3::ZERO; 2],
             };
-            write!(out, "{}", state.t_ns)?;
-            let vectors = [velocity, gyro, acc];
-            let values = position.to_array().into_iter().chain(attitude);
-            for value in values.chain(vectors.iter().flat_map(DVec3::to_array)) {
-                write!(out, ",{value}")?;
-            }
-            writeln!(out)?;
+            write!(out, "{}", state.t_ns.saturating_add(ahead_ns))?;
+            let values = [&position.to_array()[..], &attitude].concat();
+            let vectors = [velocity, gyro, acc].map(|v| v.to_array()).concat();
+            write_cells(out, &[values, vectors].concat())?;
         }
         Ok(())
     })?;
@@ -158,8 +171,9 @@ fn write_truth(
     job.target.text("mav0/state_groundtruth_estimate0/sensor.yaml", &yaml)
 }
 
-fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, notes: &[String]) -> String {
-    let mut page = Page::new("EuRoC/ASL folder", job.run);
+fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, receivers: &[String], notes: &[String]) -> String {
+    let mut page = Page::new("EuRoC/ASL folder", job);
+    let (clock, ahead_ns) = truth_clock(job, imu);
     let body = match imu {
         Some(_) => {
             "the axes of imu0: `T_BS` of imu0 is the identity, and the ground truth is that of the IMU"
@@ -175,7 +189,24 @@ fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, notes: &[String]) -> Strin
         .line("`T_BS`", "takes coordinates of the sensor to those of B; without the mount's vibration")
         .line("quaternions", "w x y z, world from B, w not negative")
         .line("pixels", PIXEL_CENTRE_0)
-        .line("stamps", "nanoseconds on the run's clock, as the camera gives them: its delay is in them");
+        .line("pictures", Samples::of_estimators(job).words())
+        .line("`mask.png`", "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere")
+        .line(
+            "stamps",
+            "nanoseconds, of each sensor by its own clock; a camera's delay is in them. Names of pictures have 19 digits",
+        )
+        .line(
+            "time of the ground truth",
+            &format!(
+                "by the clock of {clock}, which estimates are on: {} ms ahead of the run's. Biases are those of the true \
+                 time",
+                ahead_ns as f64 / 1e6
+            ),
+        )
+        .line("`imuN/data.csv`", "angular rates, then accelerations");
+    for receiver in receivers {
+        page.line(&format!("`{receiver}`"), "columns as in docs/SENSORS.md, measured values alone");
+    }
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("time of cam{i}"), &timing(camera));
     }

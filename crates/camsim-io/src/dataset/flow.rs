@@ -123,7 +123,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
 }
 
 fn page(job: &ExportJob<'_>) -> String {
-    let mut page = Page::new("Flow as Middlebury .flo, in the folders of MPI Sintel", job.run);
+    let mut page = Page::new("Flow as Middlebury .flo, in the folders of MPI Sintel", job);
     page.line("flow", "pixels right, down, to where the next picture shows the same point; 1e10 = unknown")
         .line(
             "rolling shutter",

@@ -12,7 +12,10 @@ use super::{
     csv_rows::CsvRows,
     run_folder::PlatformRows,
 };
-use crate::calibration::ImuReference;
+use crate::{
+    calibration::ImuReference,
+    write::{KalibrFigures, SENSORS_FOLDER},
+};
 
 /// An inertial sensor, with a table of its measurements.
 #[derive(Clone, Debug)]
@@ -27,18 +30,32 @@ pub(super) struct ImuSensor {
     pub(super) shakes: bool,
     /// How much its clock is ahead of the platform's.
     pub(super) clock_offset_s: f64,
-    /// Noise densities and bias random walks, as Kalibr defines them: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz),
-    /// m/s^2/sqrt(Hz), m/s^3/sqrt(Hz).
-    pub(super) gyro_noise: f64,
-    pub(super) gyro_walk: f64,
-    pub(super) acc_noise: f64,
-    pub(super) acc_walk: f64,
+    /// Noise densities and bias random walks.
+    pub(super) noise: KalibrFigures,
+    /// Gravity at the run's origin, m/s^2.
+    pub(super) gravity_m_s2: f64,
+    /// What is added to its stamps.
+    shift_ns: i64,
 }
+
+/// Gravity where a run does not say it (ISO 80000-3), m/s^2.
+const STANDARD_GRAVITY: f64 = 9.806_65;
+
+/// What estimators get for a figure that is 0: those of the ADIS16448 in the EuRoC data, as a filter cannot work with
+/// none.
+const USUAL_NOISE: KalibrFigures = KalibrFigures {
+    gyroscope_noise_density: 1.6968e-4,
+    gyroscope_random_walk: 1.9393e-5,
+    accelerometer_noise_density: 2e-3,
+    accelerometer_random_walk: 3e-3,
+};
 
 /// One measurement, with the true biases.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ImuRow {
     pub(super) t_ns: i64,
+    /// True time on the run's clock.
+    pub(super) true_ns: i64,
     pub(super) gyro_rad_s: DVec3,
     pub(super) acc_m_s2: DVec3,
     pub(super) gyro_bias_rad_s: DVec3,
@@ -51,22 +68,14 @@ pub(super) struct SensorDescription {
     pub(super) kind: String,
     /// Its table; as read, relative to the folder.
     pub(super) table: PathBuf,
-    rate_hz: f64,
+    pub(super) rate_hz: f64,
     #[serde(rename = "T_body_sensor")]
     body_from_sensor: [[f64; 4]; 4],
     #[serde(default)]
-    noise: Noise,
+    noise: KalibrFigures,
+    gravity_at_origin_m_s2: Option<f64>,
     #[serde(default)]
     scenario: SensorKeys,
-}
-
-/// Continuous-time densities of the worst axis.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-struct Noise {
-    gyroscope_noise_density: f64,
-    gyroscope_random_walk: f64,
-    accelerometer_noise_density: f64,
-    accelerometer_random_walk: f64,
 }
 
 /// Keys of the scenario.
@@ -78,13 +87,31 @@ struct SensorKeys {
     attached_to: SensorCarrier,
 }
 
-/// The sensors of a run by their names.
+impl SensorDescription {
+    /// Its axes in the body (forward, right, down).
+    pub(super) fn body_from_sensor(&self) -> Rigid {
+        let m = self.body_from_sensor;
+        let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);
+        let axes = DMat3::from_cols(column(0), column(1), column(2));
+        Rigid { rotation: DQuat::from_mat3(&axes).normalize(), translation_m: column(3) }
+    }
+}
+
+/// The sensors of a run in the order of its scenario.
 pub(super) fn descriptions(run: &RunFolder) -> Result<Vec<SensorDescription>, DatasetError> {
-    let folder = run.path.join("sensors");
+    let folder = run.shared_folder().join(SENSORS_FOLDER);
     let Ok(entries) = std::fs::read_dir(&folder) else { return Ok(Vec::new()) };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
-    paths.sort();
+    let scenario = &run.manifest().scenario;
+    let names: Vec<&str> = (scenario.imu.iter().map(|imu| imu.name.as_str()))
+        .chain(scenario.gnss.iter().map(|gnss| gnss.name.as_str()))
+        .collect();
+    let rank = |path: &PathBuf| {
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        (names.iter().position(|name| *name == stem).unwrap_or(names.len()), stem)
+    };
+    paths.sort_by_cached_key(rank);
     let read = |path: &PathBuf| {
         let fail = |message: String| DatasetError::Input { path: path.clone(), message };
         let text = std::fs::read_to_string(path).map_err(|error| fail(format!("cannot be read: {error}")))?;
@@ -99,25 +126,15 @@ pub(super) fn descriptions(run: &RunFolder) -> Result<Vec<SensorDescription>, Da
 pub(super) fn imus(run: &RunFolder) -> Result<Vec<ImuSensor>, DatasetError> {
     let inertial = descriptions(run)?.into_iter().filter(|sensor| sensor.kind == "imu");
     Ok(inertial
-        .map(|sensor| {
-            let m = sensor.body_from_sensor;
-            let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);
-            let axes = DMat3::from_cols(column(0), column(1), column(2));
-            let noise = sensor.noise;
-            ImuSensor {
-                path: sensor.table,
-                rate_hz: sensor.rate_hz,
-                body_from_imu: Rigid {
-                    rotation: DQuat::from_mat3(&axes).normalize(),
-                    translation_m: column(3),
-                },
-                shakes: sensor.scenario.attached_to == SensorCarrier::Camera && run.cameras[0].vibrates(),
-                clock_offset_s: 1e-3 * sensor.scenario.clock_offset_ms,
-                gyro_noise: noise.gyroscope_noise_density,
-                gyro_walk: noise.gyroscope_random_walk,
-                acc_noise: noise.accelerometer_noise_density,
-                acc_walk: noise.accelerometer_random_walk,
-            }
+        .map(|sensor| ImuSensor {
+            body_from_imu: sensor.body_from_sensor(),
+            rate_hz: sensor.rate_hz,
+            shakes: sensor.scenario.attached_to == SensorCarrier::Camera && run.cameras[0].vibrates(),
+            clock_offset_s: 1e-3 * sensor.scenario.clock_offset_ms,
+            noise: sensor.noise,
+            gravity_m_s2: sensor.gravity_at_origin_m_s2.unwrap_or(STANDARD_GRAVITY),
+            shift_ns: run.shift_ns(),
+            path: sensor.table,
         })
         .collect())
 }
@@ -128,8 +145,8 @@ pub(super) fn body_from_b(imu: Option<&ImuSensor>) -> Rigid {
     imu.map_or_else(|| Rigid::turn(flu_from_frd()), |imu| imu.body_from_imu)
 }
 
-/// Columns of its table: time, gyroscope, accelerometer, their biases.
-const COLUMNS: [&str; 13] = [
+/// Columns of its table: stamp, gyroscope, accelerometer, their biases, true time.
+const COLUMNS: [&str; 14] = [
     "t_ns",
     "gyro_x_rad_s",
     "gyro_y_rad_s",
@@ -143,12 +160,41 @@ const COLUMNS: [&str; 13] = [
     "accel_bias_x_m_s2",
     "accel_bias_y_m_s2",
     "accel_bias_z_m_s2",
+    "t_true_ns",
 ];
 
 impl ImuSensor {
     /// Its measurements, row by row.
     pub(super) fn rows(&self) -> Result<ImuRows, DatasetError> {
-        Ok(ImuRows(CsvRows::open(&self.path, &COLUMNS)?))
+        Ok(ImuRows { rows: CsvRows::open(&self.path, &COLUMNS)?, shift_ns: self.shift_ns })
+    }
+
+    /// Its noise for estimators, none of it 0, and the names of the figures that are 0 in truth.
+    pub(super) fn noise_for_filters(&self) -> (KalibrFigures, Vec<&'static str>) {
+        let (mut noise, mut lifted) = (self.noise, Vec::new());
+        let KalibrFigures {
+            gyroscope_noise_density,
+            gyroscope_random_walk,
+            accelerometer_noise_density,
+            accelerometer_random_walk,
+        } = &mut noise;
+        for (value, usual, name) in [
+            (gyroscope_noise_density, USUAL_NOISE.gyroscope_noise_density, "gyroscope noise"),
+            (gyroscope_random_walk, USUAL_NOISE.gyroscope_random_walk, "gyroscope walk"),
+            (accelerometer_noise_density, USUAL_NOISE.accelerometer_noise_density, "accelerometer noise"),
+            (accelerometer_random_walk, USUAL_NOISE.accelerometer_random_walk, "accelerometer walk"),
+        ] {
+            if *value <= 0.0 {
+                *value = usual;
+                lifted.push(name);
+            }
+        }
+        (noise, lifted)
+    }
+
+    /// How much its clock is ahead of the run's, nanoseconds.
+    pub(super) fn clock_offset_ns(&self) -> i64 {
+        (1e9 * self.clock_offset_s).round() as i64
     }
 
     /// Its axes and clock.
@@ -158,7 +204,7 @@ impl ImuSensor {
 
     /// Its own motion, in its own axes.
     pub(super) fn states(&self) -> Result<PlatformRows, DatasetError> {
-        PlatformRows::of_sensor(&self.path)
+        PlatformRows::of_sensor(&self.path, self.shift_ns)
     }
 
     /// What is added to stamps of a camera to get the sensor's time of the image's centre, seconds.
@@ -188,17 +234,22 @@ impl ImuSensor {
 }
 
 /// Rows of a sensor's table.
-pub(super) struct ImuRows(CsvRows);
+pub(super) struct ImuRows {
+    rows: CsvRows,
+    shift_ns: i64,
+}
 
 impl ImuRows {
     /// The next one; `None` at the end.
     pub(super) fn next_row(&mut self) -> Result<Option<ImuRow>, DatasetError> {
-        let rows = &mut self.0;
+        let rows = &mut self.rows;
         if !rows.advance()? {
             return Ok(None);
         }
+        let [t_ns, true_ns]: [i64; 2] = [rows.whole(0)?, rows.whole(13)?];
         Ok(Some(ImuRow {
-            t_ns: rows.whole(0)?,
+            t_ns: t_ns.saturating_add(self.shift_ns),
+            true_ns: true_ns.saturating_add(self.shift_ns),
             gyro_rad_s: rows.vector(1)?,
             acc_m_s2: rows.vector(4)?,
             gyro_bias_rad_s: rows.vector(7)?,
@@ -215,15 +266,16 @@ pub(super) struct Biases {
 }
 
 impl Biases {
-    /// Biases of gyroscope, rad/s, and accelerometer, m/s^2, linear between rows; instants must ascend.
+    /// Biases of gyroscope, rad/s, and accelerometer, m/s^2, at an instant of the run's clock, linear between the true
+    /// times of rows; instants must ascend.
     pub(super) fn at(&mut self, t_ns: i64) -> Result<[DVec3; 2], DatasetError> {
-        while let Some(next) = self.next.filter(|next| next.t_ns <= t_ns) {
+        while let Some(next) = self.next.filter(|next| next.true_ns <= t_ns) {
             self.last = next;
             self.next = self.rows.next_row()?;
         }
         let share = match &self.next {
-            Some(next) if t_ns > self.last.t_ns => {
-                (t_ns - self.last.t_ns) as f64 / (next.t_ns - self.last.t_ns) as f64
+            Some(next) if t_ns > self.last.true_ns => {
+                (t_ns - self.last.true_ns) as f64 / (next.true_ns - self.last.true_ns) as f64
             }
             _ => 0.0,
         };

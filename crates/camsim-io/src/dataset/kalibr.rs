@@ -6,13 +6,18 @@ use camsim_core::scenario::BoardKind;
 
 use super::{
     DatasetError, ExportJob,
-    euroc::{check_stamps, timing},
+    euroc::timing,
     imu::{ImuSensor, imus},
     page::{OPTICAL, PIXEL_CENTRE_0, Page},
+    pictures::{self, Samples},
     run_folder::RunCamera,
+    stamps::name_ns,
     text::real,
 };
-use crate::calibration::kalibr::{PoseKey, chain_yaml};
+use crate::{
+    calibration::kalibr::{PoseKey, chain_yaml},
+    write::{Number, imu_yaml},
+};
 
 /// Writes the export; returns notes.
 pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
@@ -20,14 +25,18 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     let cameras = job.run.cameras.iter().map(RunCamera::calibration).collect::<Result<Vec<_>, _>>()?;
     let reference = imus.first().map(ImuSensor::reference);
     let chain = chain_yaml(&cameras, reference.as_ref(), PoseKey::CamImu)?;
+    let samples = Samples::of_estimators(job);
     for (i, camera) in job.run.cameras.iter().enumerate() {
         camera.require(job.name(), &["color_png"])?;
-        check_stamps(job.name(), camera)?;
         job.each_frame(camera, |frame| {
             // Its reader takes the last nine digits as nanoseconds, and sorts names.
-            let name = format!("cam{i}/{:019}.png", frame.stamp_ns);
-            job.target.link(&camera.file(frame, "color_png"), &name)
+            let name = format!("cam{i}/{}.png", name_ns(frame.stamp_ns));
+            pictures::put(job, camera, frame, samples, &name)
         })?;
+        if let Some(mask) = pictures::mask(camera)? {
+            // Not in its folder, of which the bag creator takes all pictures.
+            mask.write(job, &format!("mask_cam{i}.png"), 255)?;
+        }
     }
     for (i, imu) in imus.iter().enumerate() {
         write_imu(job, i, imu)?;
@@ -47,25 +56,12 @@ fn write_imu(job: &ExportJob<'_>, i: usize, imu: &ImuSensor) -> Result<(), Datas
     job.target.stream(&format!("imu{i}.csv"), &mut |out| {
         writeln!(out, "timestamp,omega_x,omega_y,omega_z,alpha_x,alpha_y,alpha_z")?;
         while let Some(row) = rows.next_row()? {
-            let [w, a] = [row.gyro_rad_s, row.acc_m_s2];
-            writeln!(out, "{:019},{},{},{},{},{},{}", row.t_ns, w.x, w.y, w.z, a.x, a.y, a.z)?;
+            let [w, a] = [row.gyro_rad_s, row.acc_m_s2].map(|v| v.to_array().map(Number));
+            writeln!(out, "{},{},{},{},{},{},{}", name_ns(row.t_ns), w[0], w[1], w[2], a[0], a[1], a[2])?;
         }
         Ok(())
     })?;
-    job.target.text(&format!("imu{i}.yaml"), &imu_yaml(i, imu))
-}
-
-/// Noise, as `kalibr_calibrate_imu_camera --imu` reads it.
-pub(super) fn imu_yaml(i: usize, imu: &ImuSensor) -> String {
-    format!(
-        "rostopic: /imu{i}\nupdate_rate: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n\
-         gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n",
-        real(imu.rate_hz),
-        real(imu.acc_noise),
-        real(imu.acc_walk),
-        real(imu.gyro_noise),
-        real(imu.gyro_walk)
-    )
+    job.target.text(&format!("imu{i}.yaml"), &imu_yaml(&imu.noise, &format!("imu{i}"), imu.rate_hz))
 }
 
 /// Kalibr's target file for the board of the scene, if it knows boards of this kind.
@@ -96,8 +92,11 @@ fn target_yaml(job: &ExportJob<'_>) -> Result<Option<String>, DatasetError> {
 }
 
 fn page(job: &ExportJob<'_>, imus: &[ImuSensor], notes: &[String]) -> String {
-    let mut page = Page::new("Kalibr, for its bag creator", job.run);
+    let mut page = Page::new("Kalibr, for its bag creator", job);
+    let samples = Samples::of_estimators(job);
     page.line("names", "`camN/NS.png`, the stamp in nanoseconds with 19 digits")
+        .line("pictures", samples.words())
+        .line("`mask_camN.png`", "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere")
         .line("camera", OPTICAL)
         .line("pixels", PIXEL_CENTRE_0)
         .line(

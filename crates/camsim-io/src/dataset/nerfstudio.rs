@@ -12,9 +12,8 @@ use super::{
     euroc::timing,
     page::{PIXEL_CENTRE_HALF, Page, WORLD},
     run_folder::{RunCamera, RunFrame},
-    text::list,
 };
-use crate::calibration::nerfstudio::model;
+use crate::{calibration::nerfstudio::model, write::Number};
 
 /// Millimetres.
 const USUAL_STEPS: f64 = 1000.0;
@@ -87,7 +86,8 @@ fn write_transforms(
             let prefix = job.prefix(i);
             for frame in &camera.frames {
                 let matrix = enu_from_gl(&camera.centre_pose(job.name(), frame)?).matrix();
-                let rows: Vec<String> = matrix.iter().map(|row| list(row)).collect();
+                let rows =
+                    matrix.map(|row| format!("[{}]", row.map(|value| Number(value).to_string()).join(", ")));
                 write!(out, "{separator}\n    {{\"file_path\": \"{}\", ", picture("images", &prefix, frame))?;
                 if has_depth {
                     write!(out, "\"depth_file_path\": \"{}\", ", picture("depths", &prefix, frame))?;
@@ -120,7 +120,7 @@ fn notes(job: &ExportJob<'_>, scale: Option<&DepthScale>) -> Vec<String> {
 }
 
 fn page(job: &ExportJob<'_>, scale: Option<&DepthScale>, notes: &[String]) -> String {
-    let mut page = Page::new("nerfstudio", job.run);
+    let mut page = Page::new("nerfstudio", job);
     page.line("world", WORLD)
         .line(
             "camera",

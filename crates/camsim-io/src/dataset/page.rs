@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::run_folder::RunFolder;
+use super::ExportJob;
 
 /// The page, as it is put together.
 pub(super) struct Page {
@@ -11,7 +11,8 @@ pub(super) struct Page {
 
 impl Page {
     /// Begins with what it is and where it comes from.
-    pub(super) fn new(title: &str, run: &RunFolder) -> Self {
+    pub(super) fn new(title: &str, job: &ExportJob<'_>) -> Self {
+        let run = job.run;
         let manifest = run.manifest();
         let mut text = format!(
             "# {title}\n\nWritten by camsim {} from {} pictures of a run (seed {}). All of it is simulated; the truth \
@@ -23,9 +24,15 @@ impl Page {
         for (i, camera) in run.cameras.iter().enumerate().filter(|(_, camera)| !camera.name.is_empty()) {
             let _ = write!(text, "\n- cam{i}: camera `{}`", camera.name);
         }
-        if run.cameras.len() > 1 {
+        for name in &run.empty {
+            let _ = write!(text, "\n- camera `{name}` has no frames in this run, and is left out");
+        }
+        if run.cameras.len() + run.empty.len() > 1 {
             text.push('\n');
         }
+        job.notes.iter().for_each(|note| {
+            let _ = write!(text, "\n{note}\n");
+        });
         text += "\n## Conventions\n\n| what | here |\n|---|---|\n";
         Self { text }
     }

@@ -14,9 +14,9 @@ use super::{
     flow::FlowPlane,
     page::Page,
     run_folder::{RunCamera, RunFrame},
-    text::real,
     twins::{TwinNeed, partners},
 };
+use crate::write::Number;
 
 /// Most pictures of a sequence of Carla-RS, whose loader looks for no more.
 const SEQUENCE: usize = 10;
@@ -39,10 +39,8 @@ pub(super) fn write_gopro(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetErr
             job.target.advance()?;
         }
     }
-    let mut page = Page::new(
-        "Blurred and sharp pictures: GoPro (`train`) and REDS (`train_blur`, `train_sharp`)",
-        job.run,
-    );
+    let mut page =
+        Page::new("Blurred and sharp pictures: GoPro (`train`) and REDS (`train_blur`, `train_sharp`)", job);
     page.line("blurred", "the run's pictures: the mean over the exposure of linear light, then encoded")
         .line(
             "sharp",
@@ -137,7 +135,8 @@ fn write_sequence(
         job.target.advance()?;
     }
     let [w, v] = velocity(camera, part[0][0])?;
-    let numbers: Vec<String> = [w, v].iter().flat_map(DVec3::to_array).map(real).collect();
+    let numbers: Vec<String> =
+        [w, v].iter().flat_map(DVec3::to_array).map(|v| Number(v).to_string()).collect();
     job.target.text(
         &carla("gt_vel.log"),
         &format!("# Ground truth velocity in camera frame\n# wx, wy, wz, x, y, z\n{}\n", numbers.join(" ")),
@@ -187,8 +186,7 @@ fn velocity(camera: &RunCamera, frame: &RunFrame) -> Result<[DVec3; 2], DatasetE
 }
 
 fn carla_page(job: &ExportJob<'_>) -> String {
-    let mut page =
-        Page::new("Rolling and global pictures: Carla-RS (`carla`) and Fastec-RS (`fastec`)", job.run);
+    let mut page = Page::new("Rolling and global pictures: Carla-RS (`carla`) and Fastec-RS (`fastec`)", job);
     page.line(
         "time",
         "the origin is the mid-exposure of row 0, at which `gs_f` and `global_first` are taken; camsim's own is the \

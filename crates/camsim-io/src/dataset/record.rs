@@ -19,6 +19,9 @@ pub(super) struct ExportRecord {
     /// Checksum of the tables of frames.
     content: String,
     depth_per_metre: Option<f64>,
+    /// Whether estimators get colour.
+    #[serde(default)]
+    color: bool,
     /// What the user should know; missing while the export is not finished.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     notes: Option<Vec<String>>,
@@ -65,6 +68,7 @@ impl ExportRecord {
             run: checksum(identity.as_bytes()),
             content: content(run)?,
             depth_per_metre: options.depth_per_metre,
+            color: options.color,
             notes: None,
         })
     }
@@ -127,7 +131,7 @@ pub(super) fn check(
     let old: Option<ExportRecord> = serde_json::from_str(&text).ok();
     let is_same = |old: &ExportRecord| {
         (&old.version, old.format, &old.run) == (&record.version, record.format, &record.run)
-            && old.depth_per_metre == record.depth_per_metre
+            && (old.depth_per_metre, old.color) == (record.depth_per_metre, record.color)
     };
     match old {
         Some(old) if is_same(&old) && old.content == record.content => {
@@ -140,7 +144,7 @@ pub(super) fn check(
             Ok(Found::Other)
         }
         _ => Err(DatasetError::Refused(format!(
-            "{} holds an export of another run, layout or scale of depth: choose another folder with -o, or remove \
+            "{} holds an export of another run, layout, scale of depth or colour: choose another folder with -o, or remove \
              that one",
             folder.display()
         ))),

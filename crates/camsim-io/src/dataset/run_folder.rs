@@ -25,8 +25,12 @@ pub struct RunFolder {
     pub path: PathBuf,
     /// Whether the run is finished.
     pub is_finished: bool,
-    /// Its cameras, in the scenario's order; at least one.
+    /// Its cameras that have frames, in the scenario's order; at least one.
     pub cameras: Vec<RunCamera>,
+    /// Names of its cameras that have none, as no frame was asked for that they take.
+    pub empty: Vec<String>,
+    /// What is added to every stamp.
+    shift_ns: i64,
 }
 
 /// The pictures of a camera, or of a twin.
@@ -46,6 +50,8 @@ pub struct RunCamera {
     pub frames: Vec<RunFrame>,
     /// Names of the columns of files.
     columns: Vec<String>,
+    /// What is added to its stamps.
+    shift_ns: i64,
 }
 
 /// A row of `frames.csv`.
@@ -87,7 +93,7 @@ impl RunFolder {
     /// A file is missing or malformed, or no frame has been written.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         let run = read_run(path)?;
-        let cameras: Vec<RunCamera> = if run.get("cameras").is_none() {
+        let all: Vec<RunCamera> = if run.get("cameras").is_none() {
             vec![RunCamera::open(path, String::new())?]
         } else {
             let names = rig_names(path);
@@ -95,16 +101,60 @@ impl RunFolder {
             let rendered = names.iter().filter(|name| path.join(name).join("frames.csv").is_file());
             rendered.map(|name| RunCamera::open(&path.join(name), name.clone())).collect::<Result<_, _>>()?
         };
-        if cameras.is_empty() {
+        if all.is_empty() {
             let message = "names no camera that has been rendered: render the folder again".to_owned();
             return Err(DatasetError::Input { path: path.join(RIG_TOML), message });
         }
-        if let Some(empty) = cameras.iter().find(|camera| camera.frames.is_empty()) {
+        let first_table = all[0].folder.join("frames.csv");
+        let (cameras, empty): (Vec<_>, Vec<_>) =
+            all.into_iter().partition(|camera| !camera.frames.is_empty());
+        if cameras.is_empty() {
             let message = "has no frames with files: render them, with output.format not empty".to_owned();
-            return Err(DatasetError::Input { path: empty.folder.join("frames.csv"), message });
+            return Err(DatasetError::Input { path: first_table, message });
         }
         let is_finished = run.get("finished").and_then(Value::as_bool).unwrap_or(false);
-        Ok(Self { path: path.into(), is_finished, cameras })
+        let empty = empty.into_iter().map(|camera| camera.name).collect();
+        Ok(Self { path: path.into(), is_finished, cameras, empty, shift_ns: 0 })
+    }
+
+    /// The cameras with these names alone.
+    ///
+    /// # Errors
+    /// The run has no frames of one of them; the message lists those that it has.
+    pub fn of_cameras(mut self, names: &[String]) -> Result<Self, DatasetError> {
+        let has = |name: &&String| self.cameras.iter().any(|camera| camera.name == **name);
+        if let Some(unknown) = names.iter().find(|name| !has(name)) {
+            let known: Vec<&str> = self.cameras.iter().map(|camera| camera.name.as_str()).collect();
+            let which = match known[..] {
+                [""] => "the run has one camera, without a name: leave --camera out".to_owned(),
+                _ => format!("the run has frames of {}", known.join(", ")),
+            };
+            return Err(DatasetError::Refused(format!("--camera {unknown}: {which}")));
+        }
+        self.cameras.retain(|camera| names.contains(&camera.name));
+        self.empty.clear();
+        Ok(self)
+    }
+
+    /// The run with later stamps.
+    #[must_use]
+    pub(super) fn shifted(&self, shift_ns: i64) -> Self {
+        let mut later = self.clone();
+        later.shift_ns += shift_ns;
+        later.cameras.iter_mut().for_each(|camera| camera.shift(shift_ns));
+        later
+    }
+
+    /// What is added to the stamps of the run.
+    pub(super) fn shift_ns(&self) -> i64 {
+        self.shift_ns
+    }
+
+    /// The folder with what cameras and twins share: this one, or one above it.
+    pub(super) fn shared_folder(&self) -> &Path {
+        let above = self.path.ancestors().take(3);
+        let has_it = |path: &&Path| path.join(PLATFORM_TABLE).is_file() && path.join("run.json").is_file();
+        above.into_iter().find(has_it).unwrap_or(&self.path)
     }
 
     /// The `run.json` of the first camera; all have the same but for their camera.
@@ -115,7 +165,7 @@ impl RunFolder {
 
     /// The motion of the platform, row by row.
     pub(super) fn platform(&self) -> Result<PlatformRows, DatasetError> {
-        PlatformRows::open(&self.path.join("trajectory.csv"))
+        PlatformRows::open(&self.shared_folder().join(PLATFORM_TABLE), self.shift_ns)
     }
 
     /// Number of frames of all cameras.
@@ -124,6 +174,9 @@ impl RunFolder {
         self.cameras.iter().map(|camera| camera.frames.len() as u64).sum()
     }
 }
+
+/// Motion of the platform.
+const PLATFORM_TABLE: &str = "trajectory.csv";
 
 /// Reads `run.json`.
 fn read_run(folder: &Path) -> Result<Value, DatasetError> {
@@ -145,7 +198,12 @@ impl RunCamera {
         let shutter =
             Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|e| fail(e.to_string()))?;
         let (columns, frames) = read_frames(&folder.join("frames.csv"), spec.shutter.exposure_ms)?;
-        Ok(Self { name, folder: folder.into(), manifest, spec, shutter, frames, columns })
+        Ok(Self { name, folder: folder.into(), manifest, spec, shutter, frames, columns, shift_ns: 0 })
+    }
+
+    fn shift(&mut self, shift_ns: i64) {
+        self.shift_ns += shift_ns;
+        self.frames.iter_mut().for_each(|frame| frame.stamp_ns = frame.stamp_ns.saturating_add(shift_ns));
     }
 
     /// Twins beside its frames.
@@ -159,7 +217,9 @@ impl RunCamera {
     /// # Errors
     /// As [`RunFolder::open`].
     pub fn twin(&self, twin: &TwinSpec) -> Result<Self, DatasetError> {
-        Self::open(&self.folder.join(&twin.name), self.name.clone())
+        let mut twin = Self::open(&self.folder.join(&twin.name), self.name.clone())?;
+        twin.shift(self.shift_ns);
+        Ok(twin)
     }
 
     /// Columns and paths of a frame's own files; not the video, which has all frames.
@@ -332,17 +392,18 @@ pub(super) struct PlatformRows {
     rows: CsvRows,
     /// Whether times are nanoseconds, not seconds.
     has_ns: bool,
+    shift_ns: i64,
 }
 
 impl PlatformRows {
-    fn open(path: &Path) -> Result<Self, DatasetError> {
+    fn open(path: &Path, shift_ns: i64) -> Result<Self, DatasetError> {
         let columns =
             ["t_s", "n_m", "e_m", "d_m", "vn", "ve", "vd", "qw", "qx", "qy", "qz", "wx", "wy", "wz"];
-        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: false })
+        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: false, shift_ns })
     }
 
     /// The sensor is the body.
-    pub(super) fn of_sensor(path: &Path) -> Result<Self, DatasetError> {
+    pub(super) fn of_sensor(path: &Path, shift_ns: i64) -> Result<Self, DatasetError> {
         let columns = [
             "t_true_ns",
             "true_n_m",
@@ -359,7 +420,7 @@ impl PlatformRows {
             "true_gyro_y_rad_s",
             "true_gyro_z_rad_s",
         ];
-        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: true })
+        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: true, shift_ns })
     }
 
     /// The next row; `None` at the end.
@@ -368,8 +429,9 @@ impl PlatformRows {
         if !rows.advance()? {
             return Ok(None);
         }
+        let t_ns: i64 = if self.has_ns { rows.whole(0)? } else { rows.seconds_ns(0)? };
         Ok(Some(PlatformState {
-            t_ns: if self.has_ns { rows.whole(0)? } else { rows.seconds_ns(0)? },
+            t_ns: t_ns.saturating_add(self.shift_ns),
             position_ned_m: rows.vector(1)?,
             velocity_ned_m_s: rows.vector(4)?,
             ned_from_body: rows.wxyz(7)?,

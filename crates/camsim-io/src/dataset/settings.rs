@@ -6,9 +6,9 @@ use super::{
     DatasetError, ExportJob,
     axes::Rigid,
     imu::ImuSensor,
-    kalibr::imu_yaml,
+    openvins,
     run_folder::RunCamera,
-    text::{opencv_matrix, real},
+    text::{Element, opencv_matrix, real},
 };
 use crate::calibration::{
     Calibration, CalibrationError, camodocal,
@@ -26,16 +26,31 @@ pub(super) fn write(
     let imu = imus.first();
     notes.extend(imu.and_then(|imu| imu.begins_late(job.run)));
     let cameras = job.run.cameras.iter().map(RunCamera::calibration).collect::<Result<Vec<_>, _>>()?;
+    notes.extend(one_lens(&cameras));
     match orb_slam(&cameras, imu) {
         Ok(text) => job.target.text("settings/orb_slam3.yaml", &text)?,
         Err(error) => notes.push(format!("settings for ORB-SLAM3 are left out: {error}")),
     }
     let Some(imu) = imu else { return Ok(notes) };
+    let (_, lifted) = imu.noise_for_filters();
+    if !lifted.is_empty() {
+        notes.push(format!(
+            "imu0 has no {}, with which estimators do not work: settings have the values of the EuRoC data's ADIS16448 in \
+             their place",
+            lifted.join(", no ")
+        ));
+    }
     match chain_yaml(&cameras, Some(&imu.reference()), PoseKey::ImuCam) {
-        Ok(chain) => write_openvins(job, imu, &chain)?,
+        Ok(chain) => openvins::write(job, imu, &chain)?,
         Err(error) => notes.push(format!("settings for OpenVINS are left out: {error}")),
     }
-    match write_vins(job, &cameras, imu, body_from_b) {
+    let same = cameras.iter().take(2).filter(|camera| camera.spec.size_px == cameras[0].spec.size_px).count();
+    if same < cameras.len() {
+        notes.push(format!(
+            "VINS-Fusion has at most two cameras, of one size: its settings have the first {same}"
+        ));
+    }
+    match write_vins(job, &cameras[..same], imu, body_from_b) {
         Ok(()) => {}
         Err(DatasetError::Calibration(error)) => {
             notes.push(format!("settings for VINS-Fusion are left out: {error}"));
@@ -45,18 +60,28 @@ pub(super) fn write(
     Ok(notes)
 }
 
+/// A note if ORB-SLAM3 misreads the second lens.
+fn one_lens(cameras: &[Calibration]) -> Option<String> {
+    let [first, second, ..] = cameras else { return None };
+    let [first, second] = [first, second].map(|camera| camera.intrinsics.equidistant());
+    (first.is_some() && second.is_some() && first != second).then(|| {
+        "ORB-SLAM3 1.0 takes the coefficients of both fisheye lenses from Camera1, and those of cam1 are others".to_owned()
+    })
+}
+
 /// Settings of ORB-SLAM3 of version 1.0.
 fn orb_slam(cameras: &[Calibration], imu: Option<&ImuSensor>) -> Result<String, CalibrationError> {
     let reference = imu.map(ImuSensor::reference);
     let mut text = orb_slam::cameras(&cameras[..cameras.len().min(2)], reference.as_ref())?;
     if let Some(imu) = imu {
+        let (noise, _) = imu.noise_for_filters();
         let _ = write!(
             text,
             "IMU.NoiseGyro: {}\nIMU.NoiseAcc: {}\nIMU.GyroWalk: {}\nIMU.AccWalk: {}\nIMU.Frequency: {}\n",
-            real(imu.gyro_noise),
-            real(imu.acc_noise),
-            real(imu.gyro_walk),
-            real(imu.acc_walk),
+            real(noise.gyroscope_noise_density),
+            real(noise.accelerometer_noise_density),
+            real(noise.gyroscope_random_walk),
+            real(noise.accelerometer_random_walk),
             real(imu.rate_hz)
         );
     }
@@ -68,33 +93,6 @@ fn orb_slam(cameras: &[Calibration], imu: Option<&ImuSensor>) -> Result<String, 
     Ok(text)
 }
 
-fn write_openvins(job: &ExportJob<'_>, imu: &ImuSensor, chain: &str) -> Result<(), DatasetError> {
-    let name = |file: &str| format!("settings/openvins/{file}");
-    job.target.text(&name("kalibr_imucam_chain.yaml"), &format!("%YAML:1.0\n\n{chain}"))?;
-    let indented: String = imu_yaml(0, imu).lines().map(|line| format!("  {line}\n")).collect();
-    let unit = |key: &str| {
-        format!("  {key}:\n    - [1.0, 0.0, 0.0]\n    - [0.0, 1.0, 0.0]\n    - [0.0, 0.0, 1.0]\n")
-    };
-    let zero = "  Tg:\n    - [0.0, 0.0, 0.0]\n    - [0.0, 0.0, 0.0]\n    - [0.0, 0.0, 0.0]\n";
-    let text = format!(
-        "%YAML:1.0\n\nimu0:\n  T_i_b:\n    - [1.0, 0.0, 0.0, 0.0]\n    - [0.0, 1.0, 0.0, 0.0]\n    - [0.0, 0.0, 1.0, \
-         0.0]\n    - [0.0, 0.0, 0.0, 1.0]\n{indented}  model: \"kalibr\"\n  time_offset: 0.0\n{}{}{}{}{zero}",
-        unit("Tw"),
-        unit("R_IMUtoGYRO"),
-        unit("Ta"),
-        unit("R_IMUtoACC"),
-    );
-    job.target.text(&name("kalibr_imu_chain.yaml"), &text)?;
-    let cameras = job.run.cameras.len();
-    let estimator = format!(
-        "%YAML:1.0\n\nverbosity: \"INFO\"\nuse_stereo: {}\nmax_cameras: {cameras}\ncalib_cam_extrinsics: false\n\
-         calib_cam_intrinsics: false\ncalib_cam_timeoffset: false\ngravity_mag: 9.81\nrelative_config_imu: \
-         \"kalibr_imu_chain.yaml\"\nrelative_config_imucam: \"kalibr_imucam_chain.yaml\"\n",
-        cameras > 1
-    );
-    job.target.text(&name("estimator_config.yaml"), &estimator)
-}
-
 fn write_vins(
     job: &ExportJob<'_>,
     cameras: &[Calibration],
@@ -103,7 +101,6 @@ fn write_vins(
 ) -> Result<(), DatasetError> {
     let name = |file: &str| format!("settings/vins/{file}");
     let first = &job.run.cameras[0];
-    let cameras = &cameras[..cameras.len().min(2)];
     let [width, height] = first.spec.size_px;
     let mut text = format!(
         "%YAML:1.0\n\nimu: 1\nnum_of_cam: {}\nimu_topic: \"/imu0\"\noutput_path: \"~/output/\"\nimage_width: {width}\n\
@@ -113,21 +110,24 @@ fn write_vins(
     for (i, camera) in cameras.iter().enumerate() {
         let b_from_camera = body_from_b.inverse().of(&camera.body_from_camera());
         let _ = writeln!(text, "image{i}_topic: \"/cam{i}/image_raw\"\ncam{i}_calib: \"cam{i}.yaml\"");
-        text += &opencv_matrix(&format!("body_T_cam{i}"), &b_from_camera.matrix());
+        let pose = b_from_camera.matrix();
+        text += &opencv_matrix(&format!("body_T_cam{i}"), [4, 4], Element::Double, pose.as_flattened());
         job.target.text(&name(&format!("cam{i}.yaml")), &camodocal::file(&format!("cam{i}"), camera)?)?;
     }
-    let shutter = &first.shutter;
+    let (shutter, (noise, _)) = (&first.shutter, imu.noise_for_filters());
     let _ = write!(
         text,
         "multiple_thread: 1\nmax_cnt: 150\nmin_dist: 30\nfreq: 10\nF_threshold: 1.0\nshow_track: 0\nflow_back: 1\n\
-         max_solver_time: 0.04\nmax_num_iterations: 8\nkeyframe_parallax: 10.0\n# discrete noise is theirs to \
-         make of these continuous-time densities\nacc_n: {}\ngyr_n: {}\nacc_w: {}\ngyr_w: {}\ng_norm: 9.81\n\
+         max_solver_time: 0.04\nmax_num_iterations: 8\nkeyframe_parallax: 10.0\nsave_image: 0\n\
+         load_previous_pose_graph: 0\npose_graph_save_path: \"~/output/pose_graph/\"\n# discrete noise is theirs to \
+         make of these continuous-time densities\nacc_n: {}\ngyr_n: {}\nacc_w: {}\ngyr_w: {}\ng_norm: {}\n\
          # stamp + td is the time of the image's centre on the IMU's clock\nestimate_td: 0\ntd: {}\n\
          # VINS-Mono only; seconds from the first row to the last\nrolling_shutter: {}\nrolling_shutter_tr: {}\n",
-        real(imu.acc_noise),
-        real(imu.gyro_noise),
-        real(imu.acc_walk),
-        real(imu.gyro_walk),
+        real(noise.accelerometer_noise_density),
+        real(noise.gyroscope_noise_density),
+        real(noise.accelerometer_random_walk),
+        real(noise.gyroscope_random_walk),
+        real(imu.gravity_m_s2),
         real(imu.shift_s(first)),
         u8::from(!first.is_global()),
         real(shutter.readout_s())

@@ -8,14 +8,19 @@ use super::{
     DatasetError, ExportJob,
     axes::enu_from_camera,
     depth::DepthScale,
-    euroc::{check_stamps, timing},
+    euroc::timing,
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    pictures::{self, Samples},
     run_folder::{RunCamera, RunFrame},
-    text::{seconds, xyzw},
+    stamps::name_s,
+    text::xyzw,
 };
-use crate::calibration::{
-    Calibration, CalibrationError,
-    lens_names::{self, Family},
+use crate::{
+    calibration::{
+        Calibration, CalibrationError,
+        lens_names::{self, Family},
+    },
+    write::Number,
 };
 
 /// Steps per metre of the published dataset.
@@ -26,7 +31,6 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     let cameras: Vec<&RunCamera> = job.run.cameras.iter().collect();
     for camera in &cameras {
         camera.require(job.name(), &["color_png", "depth"])?;
-        check_stamps(job.name(), camera)?;
     }
     let scale = DepthScale::choose(job, &cameras, USUAL_STEPS)?;
     for (i, camera) in cameras.iter().enumerate() {
@@ -46,7 +50,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
 
 /// Name of a frame's pictures: the time at which the image's centre is exposed, by the camera's stamp.
 fn stamp(camera: &RunCamera, frame: &RunFrame) -> String {
-    seconds(camera.centre_ns(frame))
+    name_s(camera.centre_ns(frame))
 }
 
 fn write_camera(
@@ -59,7 +63,7 @@ fn write_camera(
     let file = |name: &str| format!("{prefix}{name}");
     job.each_frame(camera, |frame| {
         let stamp = stamp(camera, frame);
-        job.target.link(&camera.file(frame, "color_png"), &file(&format!("rgb/{stamp}.png")))?;
+        pictures::put(job, camera, frame, Samples::Color, &file(&format!("rgb/{stamp}.png")))?;
         job.target.make(&file(&format!("depth/{stamp}.png")), || scale.png(&camera.file(frame, "depth")))
     })?;
     for (list, what) in [("rgb", "color images"), ("depth", "depth maps")] {
@@ -81,9 +85,12 @@ fn write_camera(
         writeln!(out, "# ground truth trajectory\n# camsim\n# timestamp tx ty tz qx qy qz qw")?;
         camera.frames.iter().try_for_each(|frame| {
             let pose = camera.centre_pose(job.name(), frame)?;
-            Ok(writeln!(out, "{} {}", seconds(camera.true_centre_ns(frame)), pose_text(&pose))?)
+            Ok(writeln!(out, "{} {}", name_s(camera.true_centre_ns(frame)), pose_text(&pose))?)
         })
     })?;
+    if let Some(mask) = pictures::mask(camera)? {
+        mask.write(job, &file("mask.png"), 255)?;
+    }
     job.target.text(&file("calibration.txt"), &calibration_text)
 }
 
@@ -91,7 +98,7 @@ fn write_camera(
 pub(super) fn pose_text(pose: &CameraPose) -> String {
     let pose = enu_from_camera(pose);
     let values = pose.translation_m.to_array().into_iter().chain(xyzw(pose.rotation));
-    values.map(|value| value.to_string()).collect::<Vec<_>>().join(" ")
+    values.map(|value| Number(value).to_string()).collect::<Vec<_>>().join(" ")
 }
 
 /// Camera matrix and lens in one line, by ROS's orders.
@@ -103,13 +110,13 @@ fn calibration(camera: &Calibration) -> Result<String, CalibrationError> {
         "plumb_bob" => "fx fy cx cy d0 d1 d2 d3 d4 (k1 k2 p1 p2 k3)",
         _ => "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
     };
-    let values = [fx, fy, cx, cy].into_iter().chain(d).map(|value| value.to_string());
+    let values = [fx, fy, cx, cy].into_iter().chain(d).map(|value| Number(value).to_string());
     let values = values.collect::<Vec<_>>().join(" ");
     Ok(format!("# (0, 0) is the centre of the first pixel\n# {names}\n{values}\n"))
 }
 
 fn page(job: &ExportJob<'_>, scale: &DepthScale, notes: &[String]) -> String {
-    let mut page = Page::new("TUM RGB-D folder", job.run);
+    let mut page = Page::new("TUM RGB-D folder", job);
     page.line("world", WORLD)
         .line("pose", &format!("`tx ty tz qx qy qz qw`, world from the camera's optical axes ({OPTICAL})"))
         .line("quaternions", "x y z **w**, w not negative; camsim's own are w x y z")
@@ -125,8 +132,10 @@ fn page(job: &ExportJob<'_>, scale: &DepthScale, notes: &[String]) -> String {
         .line(
             "stamps",
             "seconds on the run's clock at which the image's centre is exposed (middle of the exposure); the camera's \
-             delay is taken away, as the layout has no place for one",
-        );
+             delay is taken away, as the layout has no place for one. Names have ten digits before the point",
+        )
+        .line("`rgb`", Samples::Color.words())
+        .line("`mask.png`", "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere");
     for (i, camera) in job.run.cameras.iter().enumerate() {
         let i = if camera.name.is_empty() { String::new() } else { format!(" of cam{i}") };
         page.line(&format!("shutter{i}"), &timing(camera));

@@ -202,7 +202,7 @@ fn write_parquet(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) ->
 }
 
 fn page(job: &ExportJob<'_>) -> String {
-    let mut page = Page::new("WebDataset: tar shards", job.run);
+    let mut page = Page::new("WebDataset: tar shards", job);
     page.line(
         "samples",
         "`frame_NNNNNN.CHANNEL.ENDING`, files of camsim as they are; of a twin `.TWIN.CHANNEL.ENDING`",

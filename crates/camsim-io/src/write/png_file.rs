@@ -94,7 +94,8 @@ pub(super) fn hue_rgb8(hue: f64, saturation: f64, value: f64) -> [u8; 3] {
     })
 }
 
-pub(super) fn encode(
+/// Encodes samples.
+pub(crate) fn encode(
     path: &Path,
     [width, height]: [u32; 2],
     bytes: &[u8],

@@ -20,6 +20,7 @@ mod rows;
 
 use description::Description;
 pub use kalibr::kalibr_yaml;
+pub(crate) use kalibr::{KalibrFigures, imu_yaml};
 pub use rows::{BAROMETER_COLUMNS, GNSS_COLUMNS, IMU_COLUMNS, MAGNETOMETER_COLUMNS};
 use rows::{Line, SensorRow};
 

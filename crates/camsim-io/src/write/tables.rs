@@ -9,6 +9,8 @@ use camsim_core::{
 };
 use glam::{DQuat, DVec3};
 
+use super::Number;
+
 /// Columns of `rows/*.csv`; q is ned_from_camera. Where the exposures of the rows differ, `exposure_ns` follows.
 pub const ROWS_COLUMNS: &str = "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd";
 /// Columns of `trajectory.csv` and of `camsim track`; q is ned_from_body, body rates are in rad/s, t_s is on
@@ -41,11 +43,11 @@ pub struct CameraRecord {
     pub rate_camera_rad_s: DVec3,
 }
 
-/// Appends comma-separated numbers, in the shortest form that reads back to the same bits.
+/// Appends numbers, each with a comma before it.
 pub(super) fn push(line: &mut String, values: &[f64]) {
     for value in values {
-        // Writing to a String cannot fail.
-        let _ = write!(line, ",{value}");
+        line.push(',');
+        line.push_str(Number(*value).digits(&mut zmij::Buffer::new()));
     }
 }
 

@@ -15,7 +15,7 @@ use std::{
 use camsim_core::tracks::TrackPoint;
 use camsim_plan::Sighting;
 
-use super::{WriteError, atomic::write_atomic_with, tables::push, write_atomic};
+use super::{Number, WriteError, atomic::write_atomic_with, tables::push, write_atomic};
 
 /// Columns of `tracks.csv`: pixel coordinates (0, 0 is the centre of the first pixel), instant of the row at
 /// the point on the clock of stamps, planar depth at that instant, 1 if nothing is in front of the point, and
@@ -62,7 +62,7 @@ pub fn tracks_rows(frame: u64, epoch_ns: i64, sightings: &[Sighting]) -> String 
     let mut text = String::with_capacity(96 * sightings.len());
     for Sighting { point, seen, is_visible } in sightings {
         let t_ns = epoch_ns.saturating_add((seen.t_s * 1e9).round() as i64);
-        let (x, y, depth_m) = (seen.px.x, seen.px.y, seen.depth_m);
+        let [x, y, depth_m] = [seen.px.x, seen.px.y, seen.depth_m].map(Number);
         let (visible, solutions) = (u8::from(*is_visible), seen.solutions);
         let _ = writeln!(text, "{frame},{point},{x},{y},{t_ns},{depth_m},{visible},{solutions}");
     }

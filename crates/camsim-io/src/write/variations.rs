@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 use toml::Value;
 
-use super::{WriteError, write_atomic};
+use super::{Number, WriteError, write_atomic};
 use crate::scenario_file::{Drawn, RandomScenario, ScenarioError};
 
 /// The table.
@@ -132,7 +132,7 @@ fn cells(drawn: &Drawn) -> Vec<String> {
 /// Numbers in the shortest form, texts as they are, anything else as JSON.
 fn cell(value: &Value) -> String {
     match value {
-        Value::Float(number) => number.to_string(),
+        Value::Float(number) => Number(*number).to_string(),
         Value::String(text) => text.clone(),
         value => serde_json::to_string(value).unwrap_or_default(),
     }

@@ -1,11 +1,17 @@
 //! Pictures, calibrations and depth of a camera.
 
+use std::path::Path;
+
+use image::{DynamicImage, ExtendedColorType};
+
 use super::{
     super::{
         DatasetError, ExportJob,
         axes::enu_from_camera,
         depth::read_depth,
+        pictures::read,
         run_folder::{RunCamera, RunFrame},
+        stereo,
     },
     Bag, Source,
     messages::{
@@ -13,10 +19,13 @@ use super::{
         TransformMessage,
     },
 };
-use crate::calibration::{
-    Calibration, CalibrationError,
-    lens_names::{self, Family},
-    ros,
+use crate::{
+    calibration::{
+        Calibration, CalibrationError,
+        lens_names::{self, Family},
+        ros,
+    },
+    write::encode_png,
 };
 
 /// The frames of a camera, one after the other.
@@ -31,7 +40,8 @@ pub(super) struct Pictures<'a> {
 
 impl<'a> Pictures<'a> {
     pub(super) fn new(job: &'a ExportJob<'a>, i: usize, camera: &'a RunCamera) -> Result<Self, DatasetError> {
-        let info = camera_info(&camera.calibration()?)?;
+        let cameras: Vec<&RunCamera> = job.run.cameras.iter().collect();
+        let info = camera_info(&camera.calibration()?, stereo::offset_m(&cameras, camera)?)?;
         Ok(Self { job, camera, name: format!("cam{i}"), info, has_depth: camera.has("depth"), next: 0 })
     }
 
@@ -40,13 +50,9 @@ impl<'a> Pictures<'a> {
     }
 
     fn send_picture(&self, frame: &RunFrame, bag: &mut Bag<'_>) -> Result<(), DatasetError> {
-        let path = self.camera.file(frame, "color_png");
-        let data = std::fs::read(&path).map_err(|error| DatasetError::Input {
-            path,
-            message: format!("cannot be read: {error}; render it again with --resume"),
-        })?;
+        let (format, data) = without_alpha(&self.camera.file(frame, "color_png"))?;
         let header = Header::new(frame.stamp_ns, self.name.as_str());
-        let picture = CompressedImage { header, format: "png".to_owned(), data: Bytes(data) };
+        let picture = CompressedImage { header, format: format.to_owned(), data: Bytes(data) };
         let kind = "sensor_msgs/msg/CompressedImage";
         bag.send(&self.topic("image_raw/compressed"), kind, frame.stamp_ns, &picture)
     }
@@ -93,8 +99,29 @@ impl Source for Pictures<'_> {
     }
 }
 
-/// The calibration as ROS has it.
-fn camera_info(camera: &Calibration) -> Result<CameraInfo, CalibrationError> {
+/// A picture with the channels that `image_transport` knows, and its format: a PNG with three channels of 8 bits is
+/// `bgr8` to it, one with one channel `mono8`, and others are named.
+fn without_alpha(path: &Path) -> Result<(&'static str, Vec<u8>), DatasetError> {
+    let picture = read(path)?;
+    let size_px = [picture.width(), picture.height()];
+    let bytes_of =
+        |samples: &[u16]| samples.iter().flat_map(|sample| sample.to_ne_bytes()).collect::<Vec<u8>>();
+    let (format, bytes, kind) = match picture {
+        DynamicImage::ImageLuma8(grey) => ("png", grey.into_raw(), ExtendedColorType::L8),
+        DynamicImage::ImageLuma16(grey) => {
+            ("mono16; png compressed mono16", bytes_of(grey.as_raw()), ExtendedColorType::L16)
+        }
+        DynamicImage::ImageRgba16(color) => {
+            let rgb = DynamicImage::ImageRgba16(color).into_rgb16();
+            ("rgb16; png compressed bgr16", bytes_of(rgb.as_raw()), ExtendedColorType::Rgb16)
+        }
+        color => ("png", color.into_rgb8().into_raw(), ExtendedColorType::Rgb8),
+    };
+    Ok((format, encode_png(path, size_px, &bytes, kind)?))
+}
+
+/// The calibration as ROS has it, of a camera that is so far to the right of and below the first one of its pair.
+fn camera_info(camera: &Calibration, offset_m: [f64; 2]) -> Result<CameraInfo, CalibrationError> {
     let (model, d) = lens_names::lens(Family::Ros, camera)?;
     let lens = &camera.intrinsics;
     let [width, height] = lens.size_px;
@@ -106,7 +133,7 @@ fn camera_info(camera: &Calibration) -> Result<CameraInfo, CalibrationError> {
         d,
         k: ros::camera_matrix(lens),
         r: ros::NO_ROTATION,
-        p: ros::projection_matrix(lens),
+        p: ros::projection_matrix(lens, offset_m),
         binning_x: 0,
         binning_y: 0,
         roi: RegionOfInterest::default(),

@@ -71,8 +71,8 @@ impl ImuMessages {
             name: format!("imu{i}"),
             rows,
             next,
-            gyro_covariance: covariance(imu.gyro_noise, imu.rate_hz),
-            acc_covariance: covariance(imu.acc_noise, imu.rate_hz),
+            gyro_covariance: covariance(imu.noise.gyroscope_noise_density, imu.rate_hz),
+            acc_covariance: covariance(imu.noise.accelerometer_noise_density, imu.rate_hz),
         })
     }
 }
@@ -112,19 +112,24 @@ pub(super) fn receivers(run: &RunFolder) -> Result<Vec<PathBuf>, DatasetError> {
 pub(super) struct Fixes {
     name: String,
     rows: CsvRows,
+    /// What is added to its stamps.
+    shift_ns: i64,
     next_ns: Option<i64>,
 }
 
 impl Fixes {
-    pub(super) fn new(i: usize, table: &std::path::Path) -> Result<Self, DatasetError> {
+    pub(super) fn new(i: usize, table: &std::path::Path, shift_ns: i64) -> Result<Self, DatasetError> {
         let rows = CsvRows::open(table, &["t_ns", "fix", "lat_deg", "lon_deg", "height_m"])?;
-        let mut fixes = Self { name: format!("gnss{i}"), rows, next_ns: None };
+        let mut fixes = Self { name: format!("gnss{i}"), rows, shift_ns, next_ns: None };
         fixes.advance()?;
         Ok(fixes)
     }
 
     fn advance(&mut self) -> Result<(), DatasetError> {
-        self.next_ns = if self.rows.advance()? { Some(self.rows.whole(0)?) } else { None };
+        self.next_ns = match self.rows.advance()? {
+            true => Some(self.rows.whole::<i64>(0)?.saturating_add(self.shift_ns)),
+            false => None,
+        };
         Ok(())
     }
 }

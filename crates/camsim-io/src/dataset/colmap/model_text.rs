@@ -6,7 +6,7 @@ use super::{
     super::{DatasetError, ExportJob, axes::Rigid, text::wxyz},
     model::Model,
 };
-use crate::calibration::colmap::camera_line;
+use crate::{calibration::colmap::camera_line, write::Number};
 
 /// Writes the five files.
 pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Result<(), DatasetError> {
@@ -50,7 +50,7 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
         model.each_image(&mut |image| {
             writeln!(out, "{} {} {} {}", image.id, pose(&image.camera_from_world), image.camera, image.name)?;
             for (i, (x, y, point)) in image.points.iter().enumerate() {
-                write!(out, "{}{x} {y} {point}", if i > 0 { " " } else { "" })?;
+                write!(out, "{}{} {} {point}", if i > 0 { " " } else { "" }, Number(*x), Number(*y))?;
             }
             Ok(writeln!(out)?)
         })
@@ -78,7 +78,7 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
         model.each_point(&mut |point| {
             let [r, g, b] = point.rgb;
             let position = joined(&point.position_m.to_array());
-            write!(out, "{} {position} {r} {g} {b} {}", point.id, model.error_px())?;
+            write!(out, "{} {position} {r} {g} {b} {}", point.id, Number(model.error_px()))?;
             point.track.iter().try_for_each(|(image, place)| write!(out, " {image} {place}"))?;
             Ok(writeln!(out)?)
         })
@@ -86,7 +86,7 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
 }
 
 fn joined(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+    values.iter().map(|value| Number(*value).to_string()).collect::<Vec<_>>().join(" ")
 }
 
 fn pose(pose: &Rigid) -> String {

@@ -33,6 +33,17 @@ pub(super) struct Sample {
     scenario: Scenario,
 }
 
+/// The IMU of a sample.
+pub(super) const IMU_TOML: &str = "kind = \"imu\"\nname = \"imu0\"\ntable = \"imu0.csv\"\nrate_hz = 200.0\nrows = 2\n\
+    gravity_at_origin_m_s2 = 9.80737\n\
+    T_body_sensor = [[1.0, 0.0, 0.0, 0.5], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.25], [0.0, 0.0, 0.0, 1.0]]\n\
+    [noise]\ngyroscope_noise_density = 0.01\ngyroscope_random_walk = 0.001\naccelerometer_noise_density = 0.02\n\
+    accelerometer_random_walk = 0.002\n[scenario]\nclock_offset_ms = 2.0\n";
+
+/// Columns of its table.
+const IMU_COLUMNS: &str = "t_ns,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,\
+    t_true_ns,gyro_bias_x_rad_s,gyro_bias_y_rad_s,gyro_bias_z_rad_s,accel_bias_x_m_s2,accel_bias_y_m_s2,accel_bias_z_m_s2";
+
 /// Motion of the camera, by frames since the fourth.
 pub(super) fn pose(frames: f64) -> CameraPose {
     // Looks north, level, and turns to the right.
@@ -114,6 +125,31 @@ impl Sample {
             "finished": true,
         });
         std::fs::write(self.run().join("run.json"), run.to_string()).unwrap();
+    }
+
+    /// Writes sensors as `camsim render` does: an inertial one whose clock is 2 ms ahead, a satellite receiver.
+    pub(super) fn write_sensors(&self) {
+        let write = |name: &str, text: String| {
+            write_atomic(&self.run().join("sensors").join(name), text.as_bytes()).unwrap();
+        };
+        write("imu0.toml", IMU_TOML.to_owned());
+        let rows = "990000000,1,2,3,4,5,6,988000000,0.1,0.2,0.3,0.4,0.5,0.6\n\
+                    1500000000,7,8,9,10,11,12,1498000000,0.2,0.3,0.4,0.5,0.6,0.7\n";
+        write("imu0.csv", format!("{IMU_COLUMNS}\n{rows}"));
+        let gnss = "kind = \"gnss\"\nname = \"gnss0\"\ntable = \"gnss0.csv\"\nrate_hz = 1.0\nT_body_sensor = [[1.0, \
+                    0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]\n";
+        write("gnss0.toml", gnss.to_owned());
+        let fixes = "t_ns,fix,lat_deg,lon_deg,height_m,t_available_ns,t_true_ns,true_lat_deg\n\
+                     1000000001,1,46.5,7.25,900.5,1000000005,1000000001,46.5\n\
+                     1050000000,0,,,,1050000009,1050000000,46.5\n";
+        write("gnss0.csv", fixes.to_owned());
+    }
+
+    /// Changes a table or a description of the run.
+    pub(super) fn edit(&self, name: &str, change: impl FnOnce(String) -> String) {
+        let path = self.run().join(name);
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(path, change(text)).unwrap();
     }
 
     /// Writes tracks: rows of frame, point, x, y, visible, solutions.
@@ -210,7 +246,10 @@ fn frame(number: u64) -> RenderedFrame {
         index: number,
         stamp_ns: stamp_ns(number),
         size_px: SIZE,
-        color_rgba: (0..pixels * 4).map(|i| ((i as u64 * 7 + number) % 97) as f32 / 96.0).collect(),
+        // The lens shows nothing in the first pixel.
+        color_rgba: (0..pixels * 4)
+            .map(|i| if i == 3 { 0.0 } else { ((i as u64 * 7 + number) % 97) as f32 / 96.0 })
+            .collect(),
         depth_m: Some((0..pixels).map(|pixel| depth_m(number, pixel)).collect()),
         coords: None,
         rows: (0..SIZE[1]).map(row).collect(),

@@ -3,15 +3,16 @@
 use std::fmt::Write as _;
 
 use camsim_core::scenario::{ImuSpec, TriadSpec};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-/// The four figures of Kalibr's noise model, in continuous time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct KalibrFigures {
-    gyroscope_noise_density: f64,
-    gyroscope_random_walk: f64,
-    accelerometer_noise_density: f64,
-    accelerometer_random_walk: f64,
+/// The four figures of Kalibr's noise model, in continuous time: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz), m/s^2/sqrt(Hz),
+/// m/s^3/sqrt(Hz).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct KalibrFigures {
+    pub(crate) gyroscope_noise_density: f64,
+    pub(crate) gyroscope_random_walk: f64,
+    pub(crate) accelerometer_noise_density: f64,
+    pub(crate) accelerometer_random_walk: f64,
 }
 
 /// What is written for 0, which Kalibr refuses (`checkGyroStatistics`).
@@ -50,24 +51,23 @@ fn decimal(value: f64) -> String {
 /// Text of Kalibr's `imu.yaml`.
 #[must_use]
 pub fn kalibr_yaml(spec: &ImuSpec) -> String {
-    let KalibrFigures {
-        gyroscope_noise_density,
-        gyroscope_random_walk,
-        accelerometer_noise_density,
-        accelerometer_random_walk,
-    } = KalibrFigures::new(spec);
+    imu_yaml(&KalibrFigures::new(spec), &spec.name, spec.rate_hz)
+}
+
+/// Text of Kalibr's `imu.yaml` for a topic.
+pub(crate) fn imu_yaml(figures: &KalibrFigures, topic: &str, rate_hz: f64) -> String {
     let mut text =
         String::from("# Noise of the worst axis, in continuous time; drift counts as random walk.\n");
     for (key, value, unit) in [
-        ("accelerometer_noise_density", accelerometer_noise_density, "m/s^2/sqrt(Hz)"),
-        ("accelerometer_random_walk", accelerometer_random_walk, "m/s^3/sqrt(Hz)"),
-        ("gyroscope_noise_density", gyroscope_noise_density, "rad/s/sqrt(Hz)"),
-        ("gyroscope_random_walk", gyroscope_random_walk, "rad/s^2/sqrt(Hz)"),
+        ("accelerometer_noise_density", figures.accelerometer_noise_density, "m/s^2/sqrt(Hz)"),
+        ("accelerometer_random_walk", figures.accelerometer_random_walk, "m/s^3/sqrt(Hz)"),
+        ("gyroscope_noise_density", figures.gyroscope_noise_density, "rad/s/sqrt(Hz)"),
+        ("gyroscope_random_walk", figures.gyroscope_random_walk, "rad/s^2/sqrt(Hz)"),
     ] {
         let zero = if value == 0.0 { "; 0 in truth, which Kalibr refuses" } else { "" };
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{key}: {}   # {unit}{zero}", decimal(value.max(LEAST)));
     }
-    let _ = write!(text, "rostopic: /{}\nupdate_rate: {}\n", spec.name, decimal(spec.rate_hz));
+    let _ = write!(text, "rostopic: /{topic}\nupdate_rate: {}\n", decimal(rate_hz));
     text
 }

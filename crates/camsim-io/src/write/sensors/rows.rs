@@ -5,7 +5,7 @@ use std::io::Write as _;
 use camsim_core::sensors::{BarometerSample, Fix, GnssSample, ImuSample, MagnetometerSample, SampleTime};
 use glam::DVec3;
 
-use super::super::tables::wxyz;
+use super::super::{Number, tables::wxyz};
 
 /// Columns of an inertial unit's table: stamp by its clock, measured rate and specific force, true instant on
 /// the clock of frames, true rate and specific force, biases, and the true pose and velocity of the sensor in
@@ -28,7 +28,7 @@ pub const BAROMETER_COLUMNS: &str =
 pub const MAGNETOMETER_COLUMNS: &str = "t_ns,mag_x_ut,mag_y_ut,mag_z_ut,t_true_ns,true_mag_x_ut,true_mag_y_ut,\
 true_mag_z_ut,field_n_ut,field_e_ut,field_d_ut";
 
-/// A line of numbers, in the shortest form that reads back to the same bits.
+/// A line of numbers.
 #[derive(Default)]
 pub(super) struct Line {
     text: Vec<u8>,
@@ -54,7 +54,7 @@ impl Line {
     }
 
     fn number(&mut self, value: f64) {
-        self.text.extend_from_slice(zmij::Buffer::new().format(value).as_bytes());
+        self.text.extend_from_slice(Number(value).digits(&mut zmij::Buffer::new()).as_bytes());
         self.text.push(b',');
     }
 
