@@ -331,7 +331,7 @@ fn plausibility_notes(spec: &CameraSpec) -> Result<Vec<String>, KeyProblem> {
 }
 
 /// A note about a principal point that would be the centre of another size, or is outside of the picture.
-fn principal_point_note([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
+pub(crate) fn principal_point_note([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
     let centred_size = [2.0 * cx + 1.0, 2.0 * cy + 1.0];
     let size = |[x, y]: [f64; 2]| format!("{x:.0} x {y:.0}");
     let [across, down] = [centred_size[0] / width, centred_size[1] / height];

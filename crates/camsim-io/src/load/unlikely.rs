@@ -7,6 +7,8 @@ use camsim_core::{
     scenario::{CameraSpec, LensModel, Reset},
 };
 
+use crate::camera_file::principal_point_note;
+
 /// Degrees across within which the field of view of a flat lens is usual.
 const USUAL_FIELD_DEG: std::ops::RangeInclusive<f64> = 0.1..=150.0;
 /// A turn and some pixels of rounding.
@@ -14,7 +16,26 @@ const MOST_TURNS: f64 = 1.05;
 
 /// Warns of a unit that is probably wrong, and of keys that have no effect or clip the picture.
 pub(super) fn unlikely_values(camera: &CameraSpec) -> Vec<String> {
-    [field_warning(camera), full_well_warning(camera), reset_warning(camera)].into_iter().flatten().collect()
+    let warnings = [
+        field_warning(camera),
+        principal_point_warning(camera),
+        full_well_warning(camera),
+        reset_warning(camera),
+    ];
+    warnings.into_iter().flatten().collect()
+}
+
+/// A size that has been changed without the calibration. A part of a picture may have its axis anywhere.
+fn principal_point_warning(camera: &CameraSpec) -> Option<String> {
+    if camera.is_part || !camera.zoom.is_empty() {
+        return None;
+    }
+    let at = camera.principal_point_px?;
+    let note = principal_point_note(camera.size_px.map(f64::from), at)?;
+    Some(format!(
+        "camera.principal_point_px: {note}. To make the pictures of a camera smaller or larger with its calibration, \
+         leave camera.size_px as it was calibrated, and set camera.resized.size_px, scale, binning or crop_px"
+    ))
 }
 
 /// A focal length that was given in millimetres, or in pixels of another size.
@@ -113,6 +134,29 @@ mod tests {
         ] {
             assert_eq!(field(model, focal_px), "", "{model:?} {focal_px}");
         }
+    }
+
+    #[test]
+    fn a_size_that_the_principal_point_is_not_of_is_named_with_the_key_that_resizes() {
+        let camera =
+            |size_px, principal_point_px| CameraSpec { size_px, principal_point_px, ..CameraSpec::default() };
+        let demo = Some([318.3, 241.2]);
+        for (size_px, wanted) in [
+            (
+                [320, 240],
+                "camera.principal_point_px: the principal point (318.3, 241.2) would be the centre of a picture of \
+                          about 638 x 483, not of 320 x 240",
+            ),
+            ([1280, 960], "not of 1280 x 960"),
+            ([160, 120], "not of 160 x 120"),
+        ] {
+            let text = principal_point_warning(&camera(size_px, demo)).unwrap_or_default();
+            assert!(text.contains(wanted) && text.contains("set camera.resized.size_px"), "{text}");
+        }
+        assert_eq!(principal_point_warning(&camera([640, 480], demo)), None);
+        assert_eq!(principal_point_warning(&camera([320, 240], None)), None);
+        let part = CameraSpec { is_part: true, ..camera([320, 240], demo) };
+        assert_eq!(principal_point_warning(&part), None);
     }
 
     #[test]
