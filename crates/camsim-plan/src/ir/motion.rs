@@ -2,6 +2,30 @@
 
 use serde::Serialize;
 
+/// How far the camera gets from a pose, and what that moves in the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Departure {
+    /// Farthest the optical centre gets, metres.
+    pub travel_m: f64,
+    /// Largest rotation, radians.
+    pub rotation_rad: f64,
+    /// Bound on the parallax of any pixel, ideal pixels.
+    pub parallax_px: f64,
+    /// Bound on the displacement by rotation, ideal pixels.
+    pub rotation_px: f64,
+}
+
+impl Departure {
+    fn and(self, other: Self) -> Self {
+        Self {
+            travel_m: self.travel_m.max(other.travel_m),
+            rotation_rad: self.rotation_rad.max(other.rotation_rad),
+            parallax_px: self.parallax_px.max(other.parallax_px),
+            rotation_px: self.rotation_px.max(other.rotation_px),
+        }
+    }
+}
+
 /// What moves within the frame: bounds that the choices rest on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Motion {
@@ -20,6 +44,8 @@ pub struct Motion {
     pub blur_px: f64,
     /// Bound on how far a straight path misses the curved one, ideal pixels.
     pub blur_sagitta_px: f64,
+    /// From the first instant of the frame, where the others are from the key pose, which several frames may share.
+    pub own: Departure,
 }
 
 impl Motion {
@@ -33,6 +59,7 @@ impl Motion {
             rotation_px: self.rotation_px.max(other.rotation_px),
             blur_px: self.blur_px.max(other.blur_px),
             blur_sagitta_px: self.blur_sagitta_px.max(other.blur_sagitta_px),
+            own: self.own.and(other.own),
         }
     }
 }
