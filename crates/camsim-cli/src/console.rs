@@ -26,8 +26,10 @@ pub struct Console<'a> {
     camera: Option<String>,
     /// The variation of a random scenario that messages are about.
     variation: Option<u64>,
-    /// Of a series of variations: what has been said, and is not said again.
-    said: Option<HashSet<String>>,
+    /// What has been said, and is not said again: warnings and, of a series of variations, all notes.
+    said: HashSet<String>,
+    /// Whether notes are about a series of variations.
+    is_series: bool,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -51,7 +53,8 @@ impl<'a> Console<'a> {
             scenario: None,
             camera: None,
             variation: None,
-            said: None,
+            said: HashSet::new(),
+            is_series: false,
         }
     }
 
@@ -77,7 +80,7 @@ impl<'a> Console<'a> {
 
     /// From now on a note that several variations have is printed once, with the number of the first.
     pub fn begin_series(&mut self) {
-        self.said = Some(HashSet::new());
+        self.is_series = true;
     }
 
     /// The command line as typed.
@@ -159,19 +162,8 @@ impl<'a> Console<'a> {
 
     /// Prints a note to standard error, unless `-q`.
     pub fn note(&mut self, text: impl fmt::Display) {
-        if self.quiet {
-            return;
-        }
-        let text = text.to_string();
-        match (&mut self.said, self.variation) {
-            (Some(said), Some(index)) => {
-                let is_new = said.insert(text.clone());
-                if is_new {
-                    self.complain(&format!("variation {index}: {text}\n"));
-                }
-            }
-            _ => self.complain(&format!("{text}\n")),
-        }
+        let once = self.is_series && self.variation.is_some();
+        self.say(text.to_string(), once);
     }
 
     /// Prints a note to standard error with `-v` only.
@@ -181,9 +173,19 @@ impl<'a> Console<'a> {
         }
     }
 
-    /// Prints a warning to standard error, unless `-q`.
+    /// Prints a warning to standard error, unless `-q`: once, however often a command comes across it.
     pub fn warn(&mut self, text: impl fmt::Display) {
-        self.note(format_args!("warning: {text}"));
+        self.say(format!("warning: {text}"), true);
+    }
+
+    fn say(&mut self, text: String, once: bool) {
+        if self.quiet || once && !self.said.insert(text.clone()) {
+            return;
+        }
+        match self.variation.filter(|_| self.is_series) {
+            Some(index) => self.complain(&format!("variation {index}: {text}\n")),
+            None => self.complain(&format!("{text}\n")),
+        }
     }
 
     /// Prints a text to standard error, even with `-q`. Errors of that stream are ignored.
@@ -218,6 +220,25 @@ pub fn quoted(word: &OsStr) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_warning_is_printed_once() {
+        let (mut out, mut err) = (Vec::new(), Vec::new());
+        let mut console = Console::new(&mut out, &mut err);
+        for _ in 0..2 {
+            console.warn("the log has a gap");
+            console.note("10 frames");
+        }
+        console.begin_series();
+        for index in [3, 4] {
+            console.set_variation(Some(index));
+            console.warn("the log has a gap");
+            console.note("11 frames");
+        }
+        drop(console);
+        let wanted = "warning: the log has a gap\n10 frames\n10 frames\nvariation 3: 11 frames\n";
+        assert_eq!(String::from_utf8_lossy(&err), wanted);
+    }
 
     #[test]
     fn hints_contain_complete_commands() {
