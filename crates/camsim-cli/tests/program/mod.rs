@@ -50,7 +50,8 @@ pub fn in_background(folder: &Path, args: &[&str]) -> Command {
 /// The program; `option` is that of `env` for the signal.
 fn with_interrupt(option: &str, folder: &Path, args: &[&str]) -> Command {
     let this = std::env::current_exe().unwrap();
-    let mut program = if cfg!(target_os = "linux") { Command::new("/usr/bin/env") } else { Command::new(&this) };
+    let mut program =
+        if cfg!(target_os = "linux") { Command::new("/usr/bin/env") } else { Command::new(&this) };
     if cfg!(target_os = "linux") {
         program.arg(option).arg(this);
     }
