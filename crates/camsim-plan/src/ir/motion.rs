@@ -15,17 +15,6 @@ pub struct Departure {
     pub rotation_px: f64,
 }
 
-impl Departure {
-    fn and(self, other: Self) -> Self {
-        Self {
-            travel_m: self.travel_m.max(other.travel_m),
-            rotation_rad: self.rotation_rad.max(other.rotation_rad),
-            parallax_px: self.parallax_px.max(other.parallax_px),
-            rotation_px: self.rotation_px.max(other.rotation_px),
-        }
-    }
-}
-
 /// What moves within the frame: bounds that the choices rest on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Motion {
@@ -49,7 +38,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Bounds on both.
+    /// Bounds on both; the frame itself stays the first.
     pub(crate) fn and(self, other: Self) -> Self {
         Self {
             nearest_m: self.nearest_m.min(other.nearest_m),
@@ -59,7 +48,7 @@ impl Motion {
             rotation_px: self.rotation_px.max(other.rotation_px),
             blur_px: self.blur_px.max(other.blur_px),
             blur_sagitta_px: self.blur_sagitta_px.max(other.blur_sagitta_px),
-            own: self.own.and(other.own),
+            own: self.own,
         }
     }
 }

@@ -19,7 +19,7 @@ pub(crate) fn merged(mut plans: Vec<FramePlan>) -> Vec<FramePlan> {
         plan.predicted.terrain =
             plan.predicted.terrain.map(|terrain| terrain.times(terrain_error_px / plan.terrain_error_px));
         plan.terrain_error_px = terrain_error_px;
-        plan.motion = motion;
+        plan.motion = Motion { own: plan.motion.own, ..motion };
         plan.skipped.push(Skip {
             what: "ideal frame of its own",
             reason: format!("frames {first} to {last} are made from one"),
