@@ -60,8 +60,8 @@ class Source:
 class Frame(Mapping[str, NDArray[Any]]):
     """A finished frame: numpy arrays of its channels, by name and as attributes.
 
-    Each array owns the memory that the renderer has filled, without a copy; numpy's ``__dlpack__`` hands it on to
-    other libraries. Images are height x width (x components), row by row from
+    Each array is the memory that the renderer has filled, without a copy, and keeps it as long as the array is used:
+    numpy calls that a view of its `base` (`flags.owndata` is False). ``__dlpack__`` hands it on to other libraries. Images are height x width (x components), row by row from
     the top-left pixel; `docs/CHANNELS.md` says what each channel holds.
 
     >>> frame = scenario[7]
@@ -224,7 +224,7 @@ class Frame(Mapping[str, NDArray[Any]]):
 
     def save(self, path: str | os.PathLike[str], encoding: str | None = None) -> None:
         """Writes the picture: `.png` in an encoding of `camera.photometric.output` (the scenario's by default),
-        `.exr` with linear 32-bit floats.
+        `.exr` with linear 32-bit floats. Folders of the path that do not exist are made.
 
         >>> scenario[0].save("first.png")
         """

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _toml
 from ._arrays import numbers_of, rows_of
-from ._errors import InputError
+from ._errors import InputError, forget_paths, name_path
 
 
 _MOST_NUMBERS = 20_000
@@ -216,6 +216,7 @@ def _png(picture: NDArray[np.uint8]) -> bytes:
 
 def _removed(folder: str, owner: int) -> None:
     """Removes a folder, but not in a fork of the process that has made it."""
+    forget_paths(folder)
     if os.getpid() == owner:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -255,13 +256,17 @@ class InputFiles:
         """The folder, as the system knows it."""
         if self._held is None:
             self._held = os.path.realpath(tempfile.mkdtemp(prefix="camsim-inputs-"))
+            name_path(self._held + os.sep, "")
             self._cleanup = weakref.finalize(self, _removed, self._held, os.getpid())
         return pathlib.Path(self._held)
 
-    def _write(self, name: str, content: bytes) -> str:
+    def _write(self, name: str, content: bytes, words: str | None = None) -> str:
+        """Writes a file. `words` is what messages call it."""
         path = self.folder / name
         path.write_bytes(content)
         self._count += 1
+        if words is not None:
+            name_path(str(path), words)
         return str(path)
 
     def contents(self) -> dict[str, bytes]:
@@ -276,9 +281,9 @@ class InputFiles:
             _check_length(value, key)
             return [self.placed(item, f"{key}.{k}") for k, item in enumerate(value)] if _is_nested(value) else list(value)
         if isinstance(value, PoseTable):
-            return self._write(f"log-{self._count}.csv", value.csv().encode())
+            return self._write(f"log-{self._count}.csv", value.csv().encode(), f"{key} (the camsim.PoseTable)")
         if isinstance(value, HeightMap):
-            return self._write(f"dem-{self._count}.tif", value.tiff())
+            return self._write(f"dem-{self._count}.tif", value.tiff(), f"{key} (the camsim.HeightMap)")
         if hasattr(value, "__array__") and not isinstance(value, np.generic):
             return self._placed_array(np.asarray(value), key)
         return value
@@ -291,7 +296,7 @@ class InputFiles:
             raise InputError(f"{key}: an array has no place on the Earth: give camsim.HeightMap(...) or camsim.HeightMap.around(...)")
         if array.ndim >= 2 and array.dtype == np.uint8:
             try:
-                return self._write(f"picture-{self._count}.png", _png(array))
+                return self._write(f"picture-{self._count}.png", _png(array), f"{key} (the array)")
             except InputError as error:
                 raise InputError(f"{key}: {error}") from None
         if array.ndim > 2 or array.size > _MOST_NUMBERS or (array.ndim == 2 and leaf in _PICTURES):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _camsim, _command, _toml
 from ._arrays import linear_of, numbers_of, pair_of, picture_of, rows_of
-from ._errors import InputError
+from ._errors import InputError, forget_paths, name_path
 from .scenario import Scenario
 
 Path = str | os.PathLike[str]
@@ -178,10 +178,11 @@ def _camera(camera: Scenario | Mapping[str, Any] | Path) -> _camsim.Camera:
     with tempfile.TemporaryDirectory(prefix="camsim-") as folder:
         path = pathlib.Path(folder) / "camera.toml"
         path.write_text(_toml.document_text(camera), encoding="utf-8")
+        name_path(str(path), "camera")
         try:
             return _camsim.Camera.load(path, None)
-        except InputError as error:
-            raise InputError(str(error).replace(f"{path}:", "camera:")) from None
+        finally:
+            forget_paths(folder)
 
 
 @dataclass(frozen=True)
@@ -195,8 +196,8 @@ class Comparison:
     """Root mean square difference."""
     max: float
     """Largest absolute difference."""
-    psnr_db: float | None
-    """Peak signal-to-noise ratio for a peak of 1; None for equal pictures."""
+    psnr_db: float
+    """Peak signal-to-noise ratio for a peak of 1; infinite for equal pictures."""
     ssim: float | None
     """Structural similarity of luminance, 1 for equal pictures; None below 11 pixels of width or height."""
     differing: float
@@ -232,9 +233,11 @@ def compare(a: ArrayLike | Path, b: ArrayLike | Path) -> Comparison:
 
 
 def _told(figures: dict[str, Any]) -> dict[str, Any]:
-    """Figures with NaN where JSON has null for it."""
+    """Figures with NaN and infinity where JSON, which has neither, has null."""
     if figures["rmse"] is None:
         figures.update(rmse=math.nan, max=math.nan, psnr_db=math.nan, ssim=math.nan)
+    elif figures["psnr_db"] is None:
+        figures.update(psnr_db=math.inf)
     return figures
 
 

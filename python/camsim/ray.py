@@ -1,4 +1,4 @@
-"""Frames for Ray Data, rendered by actors that each hold a renderer (``pip install camsim[ray]``).
+"""Frames for Ray Data, rendered by actors that each hold a renderer (``pip install '.[ray]'`` in a clone).
 
 >>> import camsim, camsim.ray
 >>> variations = camsim.randomize(scenario, {"camera.shutter.readout_ms": camsim.Uniform(5, 30)}, seed=7, count=100_000)
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 try:
     import ray.data
 except ImportError as error:
-    raise ImportError("camsim.ray needs Ray Data: pip install camsim[ray]") from error
+    raise ImportError("camsim.ray needs Ray Data: pip install '.[ray]' in a clone of camsim") from error
 
 from ._samples import Samples, stacked
 from .randomize import Variations

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, SupportsIndex, overload
 
 from . import _camsim, _command, _toml
-from ._errors import InputError, ScenarioWarning
+from ._errors import InputError, ScenarioWarning, forget_paths, in_users_words, name_path
 from .frame import Frame
 from .frames import Frames, channel_names, frame_number
 from .inputs import InputFiles
@@ -40,8 +40,9 @@ class Scenario(Sequence[Frame]):
             raise TypeError("use Scenario.load(path), Scenario.from_dict(tree) or Scenario.demo() to make a scenario")
         self._native = native
         self._files = files
+        known = set(known)
         self._twin_of: tuple[Scenario, str, int | None] | None = None
-        for warning in native.warnings():
+        for warning in self.warnings:
             if warning not in known:
                 warnings.warn(warning, ScenarioWarning, stacklevel=3)
 
@@ -108,6 +109,7 @@ class Scenario(Sequence[Frame]):
         """
         files = InputFiles()
         path = _camsim.unpack_demo(files.folder)
+        name_path(str(path), "Scenario.demo()")
         return cls(_camsim.Scenario.load(path, [], None, None, backend), files)
 
     def to_dict(self) -> dict[str, Any]:
@@ -205,7 +207,7 @@ class Scenario(Sequence[Frame]):
     @property
     def warnings(self) -> list[str]:
         """What looks like a mistake in the scenario, and what camsim reads otherwise than it is written."""
-        return self._native.warnings()
+        return [in_users_words(warning) for warning in self._native.warnings()]
 
     @property
     def objects(self) -> list[tuple[str, int]]:
@@ -332,6 +334,7 @@ class Scenario(Sequence[Frame]):
         """What a command prints of this scenario; `{scenario}` among the words is its file."""
         with tempfile.TemporaryDirectory(prefix="camsim-") as folder:
             path = os.path.join(folder, "scenario.json")
+            name_path(path, "the scenario")
             with open(path, "w", encoding="utf-8") as file:
                 json.dump({"scenario": self.to_dict()}, file)
             camera = ["--camera", self.camera] if len(self._native.cameras) > 1 else []
@@ -339,7 +342,10 @@ class Scenario(Sequence[Frame]):
             is_named = self._native.backend in ("cpu", "gpu")
             backend = ["--backend", self._native.backend] if is_named else []
             command = [path if word == "{scenario}" else word for word in words]
-            return _command.output([*command, *camera, *backend], fails_with_output=fails_with_output)
+            try:
+                return _command.output([*command, *camera, *backend], fails_with_output=fails_with_output)
+            finally:
+                forget_paths(folder)
 
     def __repr__(self) -> str:
         camera = f" of {self.camera}" if self.camera else ""
@@ -397,4 +403,4 @@ def _restored(text: str, camera: str | None, backend: str, folder: str, contents
         text = text.replace(json.dumps(folder)[1:-1], json.dumps(str(files.folder))[1:-1])
     document = _toml.document_text(json.loads(text))
     native = _camsim.Scenario.parse(document, pathlib.Path("scenario"), camera, backend)
-    return Scenario(native, files, known=native.warnings())
+    return Scenario(native, files, known=map(in_users_words, native.warnings()))

@@ -1,4 +1,4 @@
-"""Frames for PyTorch: a map-style dataset that renders its samples (``pip install camsim[torch]``).
+"""Frames for PyTorch: a map-style dataset that renders its samples (``pip install '.[torch]'`` in a clone).
 
 >>> import camsim, camsim.torch
 >>> from torch.utils.data import DataLoader
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 try:
     import torch
 except ImportError as error:
-    raise ImportError("camsim.torch needs PyTorch: pip install camsim[torch]") from error
+    raise ImportError("camsim.torch needs PyTorch: pip install '.[torch]' in a clone of camsim") from error
 
 from ._samples import Samples
 from .randomize import Variations

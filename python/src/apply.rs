@@ -7,7 +7,7 @@ use camsim::{
         scenario::Preset,
         temporal::{IdealGeometry, displacement::Twist},
     },
-    io::pictures::read_gray_image,
+    io::pictures::read_vignette,
 };
 use glam::{DQuat, DVec2, DVec3};
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -173,8 +173,7 @@ pub fn apply<'py>(
         ..Settings::default()
     };
     let (made, empty) = py.detach(|| {
-        let vignette =
-            spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_input_error()?;
+        let vignette = read_vignette(spec).or_input_error()?;
         in_own_pool(|| {
             let pipeline = Pipeline::new(spec, &frame, &motion, &settings).or_input_error()?;
             Ok::<_, PyErr>(pipeline.render_and_count(vignette.as_ref()))

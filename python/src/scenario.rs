@@ -14,7 +14,7 @@ use camsim::{
         builtin,
         load::{LoadError, Loaded, load_sequence, reload_sequence},
         portable::portable_rig,
-        scenario_file::{self, RANDOMIZE, drawn_json, rig_json, rig_table},
+        scenario_file::{self, RANDOMIZE, RandomScenario, drawn_json, rig_json, rig_table},
     },
 };
 use pyo3::{prelude::*, types::PyDict};
@@ -289,11 +289,18 @@ impl Scenario {
     /// Every key with its value, as JSON; with `absolute` all paths are, and `[randomize]` is among the keys.
     fn json(&self, absolute: bool) -> PyResult<String> {
         let State { rig, source, .. } = self.snapshot();
+        // Values are drawn for the camera before it is resized.
+        let draws = if absolute && source.variation.is_none() {
+            Some(source.random().or_input_error()?).filter(|random| random.is_random())
+        } else {
+            None
+        };
+        let rig = draws.map_or(&*rig, RandomScenario::stated);
         // Nothing is near the root, so that paths relative to it are absolute ones.
-        let tree = if absolute { portable_rig(&rig, Path::new("/")) } else { rig_json(&rig) };
+        let tree = if absolute { portable_rig(rig, Path::new("/")) } else { rig_json(rig) };
         let mut tree = tree.or_run_error()?;
-        if absolute && source.variation.is_none() {
-            let table = source.random().or_input_error()?.randomize_table().or_input_error()?;
+        if let Some(draws) = draws {
+            let table = draws.randomize_table().or_input_error()?;
             if let (Some(table), Some(root)) = (table, tree.as_object_mut()) {
                 root.insert(RANDOMIZE.into(), table);
             }

@@ -1,4 +1,4 @@
-"""Arrays own their memory, frames end in any order, and nothing grows."""
+"""Arrays keep their memory, frames end in any order, and nothing grows."""
 
 from __future__ import annotations
 

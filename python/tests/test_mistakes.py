@@ -6,8 +6,10 @@ import json
 import math
 import pathlib
 import pickle
+import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from typing import Any
@@ -61,6 +63,54 @@ def test_arrays_that_are_no_values_are_refused_at_once(keys: dict[str, Any], mes
     assert time.monotonic() - begin < 5
 
 
+def test_messages_name_what_was_given_and_no_file_of_camsim() -> None:
+    names = re.compile(r"camsim-|" + re.escape(tempfile.gettempdir()))
+    demo = camsim.Scenario.demo()
+    with pytest.raises(camsim.InputError) as of_demo:
+        demo.replace({"camera.sise_px": [64, 48]})
+    with pytest.raises(camsim.InputError, match=r"^flight\.log \(the camsim\.PoseTable\)") as of_log:
+        camsim.Scenario.from_dict(tree(flight__log=camsim.PoseTable([0.0, 1.0], position_ned_m=np.full((2, 3), math.nan))))
+    with pytest.raises(camsim.InputError, match="^camera:") as of_camera:
+        camsim.apply({"sise_px": [4, 3]}, np.zeros((3, 4, 3), np.uint8), focal_px=[4, 4])
+    flat = camsim.HeightMap.around(np.zeros((8, 8)), lat_deg=80, lon_deg=8, step_m=10)
+    picture = np.full((8, 8, 3), 128, np.uint8)
+    with pytest.warns(camsim.ScenarioWarning) as of_warnings:
+        demo.replace({"scene.terrain.dem": flat, "scene.terrain.ortho": picture, "camera.photometric.vignette": picture})
+    texts = [str(error.value) for error in (of_demo, of_log, of_camera)] + [str(warning.message) for warning in of_warnings]
+    for text in texts:
+        assert not names.search(text), text
+
+
+def test_a_size_without_its_principal_point_is_named_with_the_remedy() -> None:
+    demo = camsim.Scenario.demo()
+    with pytest.warns(camsim.ScenarioWarning, match=r"camera\.principal_point_px.* of 320 x 240.* set camera\.resized\.size_px"):
+        demo.replace({"camera.size_px": [320, 240]})
+    small = demo.replace({"camera.resized.size_px": [320, 240]})
+    assert small.lens.size_px == (320, 240) and small.lens.focal_px == (210, 210.5)
+    assert small.warnings == demo.warnings
+    # The point of a ray is half as far from the corner.
+    rays = np.array([[0.1, -0.2, 1.0], [-0.5, 0.3, 1.0]])
+    assert np.abs(small.lens.project(rays) + 0.5 - 0.5 * (demo.lens.project(rays) + 0.5)).max() < 1e-12
+    full, half = demo[0].color, small[0].color
+    assert half.shape == (240, 320, 4)
+    mean = full[..., :3].reshape(240, 2, 320, 2, 3).mean(axis=(1, 3))
+    # Noise of 0.01 is halved by four pixels.
+    assert np.sqrt(np.mean((half[..., :3] - mean) ** 2)) < 0.012
+    again = pickle.loads(pickle.dumps(small))
+    assert again.lens.focal_px == small.lens.focal_px and np.array_equal(again[0].color, half)
+    with pytest.raises(camsim.InputError, match=r"camera\.resized\.binning.*another factor is camera\.resized\.scale"):
+        demo.replace({"camera.resized.binning": 1.5})
+
+
+def test_saving_makes_the_folder(tmp_path: pathlib.Path) -> None:
+    frame = camsim.Scenario.from_dict(tree())[0]
+    frame.save(tmp_path / "no" / "folder" / "a.png")
+    assert (tmp_path / "no" / "folder" / "a.png").is_file()
+    assert camsim.compare(frame.color, frame.color).psnr_db == math.inf
+    file = tmp_path / "no" / "folder" / "a.png"
+    assert camsim.compare(file, file).psnr_db == math.inf
+
+
 def test_small_arrays_are_lists() -> None:
     scenario = camsim.Scenario.from_dict(tree(camera__lens={"model": "kannala-brandt", "coefficients": np.array([0.01, 0.0])}))
     assert scenario.lens.focal_px == (60, 60) and scenario.lens.coefficients[0] == 0.01
@@ -109,11 +159,11 @@ def test_pictures_with_nan_have_no_figures() -> None:
     one[3, 4] = math.nan
     for other in (np.full_like(black, math.nan), one):
         told = camsim.compare(other, black)
-        assert told.psnr_db is not None and told.ssim is not None
+        assert told.ssim is not None
         assert all(math.isnan(figure) for figure in (told.rmse, told.max, told.psnr_db, told.ssim))
         assert told.non_finite == np.count_nonzero(np.isnan(other)) and told.differing == told.non_finite / 400
     alike = camsim.compare(one, one)
-    assert (alike.rmse, alike.non_finite, alike.psnr_db) == (0, 1, None)
+    assert (alike.rmse, alike.non_finite, alike.psnr_db) == (0, 1, math.inf)
 
 
 def test_files_with_nan_have_no_figures(tmp_path: pathlib.Path) -> None:

@@ -173,6 +173,8 @@ def test_forks_render_unless_their_parent_has(pattern: pathlib.Path) -> None:
 
 INTERRUPTED = """
     import camsim, os, signal, sys, threading
+    # What a script starts in the background has it ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     scenario = camsim.Scenario.load(sys.argv[1], sets={"flight.window_s": [0, 45]})
     interrupt = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
     try:

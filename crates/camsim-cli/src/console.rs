@@ -26,10 +26,10 @@ pub struct Console<'a> {
     camera: Option<String>,
     /// The variation of a random scenario that messages are about.
     variation: Option<u64>,
-    /// Whether variations follow each other.
-    is_series: bool,
-    /// Warnings, and all notes of a series of variations, that have been printed and are not printed again.
+    /// What has been said, and is not said again: warnings and, of a series of variations, all notes.
     said: HashSet<String>,
+    /// Whether notes are about a series of variations.
+    is_series: bool,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -53,8 +53,8 @@ impl<'a> Console<'a> {
             scenario: None,
             camera: None,
             variation: None,
-            is_series: false,
             said: HashSet::new(),
+            is_series: false,
         }
     }
 
@@ -162,18 +162,8 @@ impl<'a> Console<'a> {
 
     /// Prints a note to standard error, unless `-q`.
     pub fn note(&mut self, text: impl fmt::Display) {
-        if self.quiet {
-            return;
-        }
-        let text = visible(&text.to_string());
-        match self.variation.filter(|_| self.is_series) {
-            None => self.complain(&format!("{text}\n")),
-            Some(index) => {
-                if self.said.insert(text.clone()) {
-                    self.complain(&format!("variation {index}: {text}\n"));
-                }
-            }
-        }
+        let once = self.is_series && self.variation.is_some();
+        self.say(text.to_string(), once);
     }
 
     /// Prints a note to standard error with `-v` only.
@@ -183,11 +173,18 @@ impl<'a> Console<'a> {
         }
     }
 
-    /// Prints a warning to standard error, unless `-q`, once.
+    /// Prints a warning to standard error, unless `-q`: once, however often a command comes across it.
     pub fn warn(&mut self, text: impl fmt::Display) {
-        let text = format!("warning: {text}");
-        if self.is_series || self.said.insert(text.clone()) {
-            self.note(text);
+        self.say(format!("warning: {text}"), true);
+    }
+
+    fn say(&mut self, text: String, once: bool) {
+        if self.quiet || once && !self.said.insert(text.clone()) {
+            return;
+        }
+        match self.variation.filter(|_| self.is_series) {
+            Some(index) => self.complain(&format!("variation {index}: {text}\n")),
+            None => self.complain(&format!("{text}\n")),
         }
     }
 
@@ -232,15 +229,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn warnings_are_printed_once_and_notes_as_often_as_they_are_given() {
+    fn a_warning_is_printed_once() {
         let (mut out, mut err) = (Vec::new(), Vec::new());
         let mut console = Console::new(&mut out, &mut err);
         for _ in 0..2 {
-            console.warn("a\u{c}b");
-            console.note("n");
+            console.warn("the log has a gap");
+            console.note("10 frames");
+        }
+        console.begin_series();
+        for index in [3, 4] {
+            console.set_variation(Some(index));
+            console.warn("the log has a gap");
+            console.note("11 frames");
         }
         drop(console);
-        assert_eq!(String::from_utf8_lossy(&err), "warning: a\\u{c}b\nn\nn\n");
+        let wanted = "warning: the log has a gap\n10 frames\n10 frames\nvariation 3: 11 frames\n";
+        assert_eq!(String::from_utf8_lossy(&err), wanted);
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub const BAD_INPUT: u8 = 2;
 /// Exit code of a machine without an adapter.
 pub const NO_ADAPTER: u8 = 3;
 
-/// Exit code of a run that the user stopped (128 + SIGINT, as in shells).
+/// Exit code of a run that the user stopped by Ctrl-C or SIGTERM (128 + SIGINT, as in shells).
 pub const INTERRUPTED: u8 = 130;
 
 /// An error with its exit code.

@@ -2,6 +2,18 @@
 
 use std::{fmt, str::FromStr};
 
+/// Reads the number of one frame or variation.
+///
+/// # Errors
+/// A message for the user.
+pub fn whole_number(text: &str) -> Result<u64, String> {
+    let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    text.parse()
+        .ok()
+        .filter(|_| is_number)
+        .ok_or_else(|| format!("it is a number that counts from 0, such as 7, and at most {}", u64::MAX))
+}
+
 /// Ranges as typed; omitted ends come from the sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameList(Vec<FrameRange>);
@@ -37,7 +49,7 @@ impl fmt::Display for FrameListError {
             Self::Syntax(part) => {
                 write!(
                     f,
-                    "`{part}` is not a frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several \
+                    "`{part}` is not a range of frames, which count from 0: write 7, 10..20 (without 20), 10..=20, 10.. or several \
                      of them with commas"
                 )
             }
@@ -180,6 +192,14 @@ mod tests {
 
     fn frames(text: &str, of: u64) -> Result<Vec<u64>, FrameListError> {
         text.parse::<FrameList>()?.resolve(of)
+    }
+
+    #[test]
+    fn numbers_count_from_0() {
+        assert_eq!((whole_number("0"), whole_number("12")), (Ok(0), Ok(12)));
+        for text in ["-1", "", "1.5", "+3", "a", "18446744073709551616"] {
+            assert!(whole_number(text).is_err_and(|error| error.contains("counts from 0")), "{text}");
+        }
     }
 
     #[test]

@@ -16,6 +16,7 @@ use camsim_io::{
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
+    frame_list::whole_number,
 };
 
 /// A scenario file, and changes of it by the command line.
@@ -29,7 +30,7 @@ pub struct ScenarioArgs {
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Variation of a scenario with [randomize] [default: without what is drawn]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = whole_number, allow_hyphen_values = true)]
     pub variation: Option<u64>,
 }
 
@@ -178,8 +179,8 @@ fn with_warnings(mut loaded: Loaded, console: &mut Console<'_>) -> Result<Loaded
     Ok(loaded)
 }
 
-/// As [`load`], for all cameras of a rig. Warnings that all of them have are printed once. What is the same in
-/// `before` is not read again.
+/// As [`load`], for all cameras of a rig. A warning that several of them have is printed once, with their names if
+/// not all have it. What is the same in `before` is not read again.
 pub fn load_cameras(rig: &Rig, before: &[Loaded], console: &mut Console<'_>) -> Result<Vec<Loaded>, Failure> {
     if !rig.is_list() {
         let loaded = match before.first() {
@@ -189,24 +190,48 @@ pub fn load_cameras(rig: &Rig, before: &[Loaded], console: &mut Console<'_>) -> 
         return Ok(vec![with_warnings(loaded.or_bad_input()?, console)?]);
     }
     let mut all = reload_rig(rig, before).or_bad_input()?;
-    let is_shared = |warning: &String| all.iter().all(|loaded| loaded.warnings.contains(warning));
-    let shared: Vec<String> = all[0].warnings.iter().filter(|warning| is_shared(warning)).cloned().collect();
-    for warning in &shared {
-        console.warn(console.whole(warning));
+    let told = warnings_of_cameras(rig.names().zip(all.iter().map(|loaded| &loaded.warnings[..])));
+    for (warning, names) in &told {
+        if names.len() == all.len() {
+            console.warn(console.whole(warning));
+            continue;
+        }
+        console.set_camera(names.first().copied());
+        let s = if names.len() == 1 { "" } else { "s" };
+        console.warn(format_args!("camera{s} {}: {}", names.join(", "), console.whole(warning)));
+        console.set_camera(None);
     }
+    let told: Vec<(String, usize)> =
+        told.into_iter().map(|(warning, names)| (warning, names.len())).collect();
+    let of_all = all.len();
     for (loaded, name) in all.iter_mut().zip(rig.names()) {
-        console.set_camera(Some(name));
         for warning in &mut loaded.warnings {
-            let is_own = !shared.contains(warning);
+            let is_shared = told.iter().any(|(text, cameras)| text == warning && *cameras == of_all);
+            console.set_camera((!is_shared).then_some(name));
             *warning = console.whole(warning);
-            if is_own {
-                console.warn(format_args!("camera {name}: {warning}"));
-            }
         }
     }
     console.set_camera(None);
     print_details(rig.first(), &all[0].log, console);
     Ok(all)
+}
+
+/// Each warning with the names of the cameras that have it, those of the most cameras first.
+fn warnings_of_cameras<'a>(
+    cameras: impl Iterator<Item = (&'a str, &'a [String])>,
+) -> Vec<(String, Vec<&'a str>)> {
+    let mut told: Vec<(String, Vec<&str>)> = Vec::new();
+    for (name, warnings) in cameras {
+        for warning in warnings {
+            match told.iter_mut().find(|(text, _)| text == warning) {
+                Some((_, names)) if names.contains(&name) => {}
+                Some((_, names)) => names.push(name),
+                None => told.push((warning.clone(), vec![name])),
+            }
+        }
+    }
+    told.sort_by_key(|(_, names)| std::cmp::Reverse(names.len()));
+    told
 }
 
 /// Loads and tracks the log, without the scene.
@@ -237,6 +262,18 @@ fn print_details(scenario: &Scenario, log: &FlightLog, console: &mut Console<'_>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_warning_of_several_cameras_is_told_once_with_their_names() {
+        let [left, right, down] = [&["b", "a"][..], &["a", "b", "b"], &["a"]]
+            .map(|texts| texts.iter().map(|&text| text.to_owned()).collect::<Vec<_>>());
+        let cameras = [("left", &left[..]), ("right", &right[..]), ("down", &down[..])];
+        let told = warnings_of_cameras(cameras.into_iter());
+        assert_eq!(
+            told,
+            [("a".to_owned(), vec!["left", "right", "down"]), ("b".to_owned(), vec!["left", "right"])]
+        );
+    }
 
     #[test]
     fn set_splits_at_the_first_equals_sign() {

@@ -49,8 +49,9 @@ Exit codes:
   1  failure during the run (disk, GPU, a check that did not pass)
   2  wrong usage or invalid input; the message names the place and a remedy
   3  no usable graphics adapter where one is demanded
-  130  stopped by Ctrl-C after the current frames: all files are complete, and the message tells how to resume;
-     a second Ctrl-C ends at once
+  130  stopped by Ctrl-C or SIGTERM after the current frames: all files are complete, and the message tells how
+     to resume; a second one ends at once. Where a shell has it ignored, in the background of a script,
+     Ctrl-C does nothing, and SIGTERM stops
 
 --backend cpu renders without a graphics adapter; CAMSIM_ADAPTER=part-of-a-name picks one (`camsim info` lists them).";
 

@@ -9,7 +9,7 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::{sensors::Sensors, sequence::Sequence};
+use camsim_core::{geodesy::LocalFrame, sensors::Sensors, sequence::Sequence};
 use camsim_engine::Finished;
 use camsim_io::{
     load::TrackInputs,
@@ -56,6 +56,8 @@ pub struct Job<'a> {
     pub camera: Option<&'a str>,
     /// The loaded sequence.
     pub sequence: &'a Arc<Sequence>,
+    /// Where on Earth its local frame lies, if that is known.
+    pub earth: Option<LocalFrame>,
     /// Which variation of a random scenario it is.
     pub variation: Option<&'a VariationRecord>,
     /// Output folder.
@@ -127,13 +129,16 @@ pub fn run(
         console.set_camera(job.camera);
         let tracks = JobTracks::new(job, source.scene_planner(), console)?;
         if i == 0 {
-            rig.map_or(Ok(()), |rig| rig.write_begin(jobs, &inputs, &adapter))?;
+            rig.map_or(Ok(()), |rig| rig.write_begin(jobs, &inputs, &adapter, console))?;
         }
         let mut run = Run { job, tracks, console, on_frame, outcome: &mut outcome };
         run.render_all(pictures, source)?;
     }
     console.set_camera(None);
-    rig.map_or(Ok(()), |rig| rig.write_end(jobs, &inputs, &adapter))?;
+    if let Some(rig) = rig {
+        rig.write_end(jobs, &inputs, &adapter)?;
+        outcome.bytes += tables::motion_bytes(rig.folder);
+    }
     Ok(outcome)
 }
 
@@ -211,6 +216,7 @@ impl Run<'_, '_, '_, '_> {
         manifest.tracked_points = tracks.map(JobTracks::points);
         manifest.warnings.extend(tracks.into_iter().flat_map(JobTracks::notes).cloned());
         prepare(job, pictures, &todo, &manifest, tracks, self.console)?;
+        self.outcome.bytes += if pictures.twin.is_none() { tables::motion_bytes(job.folder) } else { 0 };
         let findings = Findings::new(&pictures.sequence.scenario.quality);
         let mut collected = Collected { made: BTreeMap::new(), findings, manifest };
         let last = pictures.series.len() - 1;
@@ -289,7 +295,7 @@ impl Run<'_, '_, '_, '_> {
             })
             .sum();
         manifest.finished = is_ok && completes == Some(true);
-        let tables_written = finish(pictures, series, made, manifest, tracks, source);
+        let tables_written = finish(self.job, pictures, series, made, manifest, tracks, source);
         if is_stopped && written.is_ok() {
             tables_written?;
             return Err(self.interrupted(pictures, manifest.written));
@@ -400,6 +406,7 @@ fn prepare(
 
 /// Writes the files after the last frame.
 fn finish(
+    job: &Job<'_>,
     pictures: &Pictures,
     series: &Series,
     made: &BTreeMap<(u64, Option<u32>), SourceFrame>,
@@ -410,6 +417,9 @@ fn finish(
     let _lock = Lock::take(&pictures.folder)?;
     let frames = tables::end_frames(pictures, series, source.planner(), made)?;
     tracks.map_or(Ok(()), |tracks| tracks.finish(&frames))?;
+    if pictures.twin.is_none() {
+        tables::complete_trajectories(job)?;
+    }
     manifest.write(&pictures.folder).or_failed()
 }
 

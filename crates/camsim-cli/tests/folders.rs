@@ -11,6 +11,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use camsim_core::geodesy::{Geodetic, LocalFrame};
+use glam::DVec3;
 use program::{camsim, program, spawn, wait};
 
 /// A camera so small that the reference renders it quickly.
@@ -79,6 +81,74 @@ fn frames(folder: &Path) -> Vec<BTreeMap<String, String>> {
 
 fn numbers(folder: &Path) -> Vec<u64> {
     frames(folder).iter().map(|row| row["frame"].parse().unwrap()).collect()
+}
+
+/// Times of the first and the last row of a table, and the number of rows.
+fn span_s(table: &Path) -> ([f64; 2], usize) {
+    let text = fs::read_to_string(table).unwrap();
+    let times: Vec<f64> =
+        text.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
+    ([times[0], times[times.len() - 1]], times.len())
+}
+
+#[test]
+fn trajectories_cover_the_frames_of_the_folder() {
+    let base = tempfile::tempdir().unwrap();
+    let out = base.path().join("out");
+    // 23 of 24 parts of a readout of 33 ms, and an exposure of 8 ms, about the stamps; 30 frames and 400 ticks a second.
+    let half_s = 0.5 * (0.033 * 23.0 / 24.0 + 0.008);
+    let about = |first: f64, last: f64| [10.0 + first / 30.0 - half_s, 10.0 + last / 30.0 + half_s];
+    let covers = |wanted: [f64; 2]| {
+        for table in ["trajectory.csv", "camera_trajectory.csv"] {
+            let (found, rows) = span_s(&out.join(table));
+            assert!(found[0] <= wanted[0] && found[1] >= wanted[1], "{table}: {found:?} {wanted:?}");
+            assert!(
+                wanted[0] - found[0] < 0.003 && found[1] - wanted[1] < 0.003,
+                "{table}: {found:?} {wanted:?}"
+            );
+            assert_eq!(rows, ((found[1] - found[0]) * 400.0).round() as usize + 1);
+        }
+    };
+    for (more, wanted) in [
+        (&["--frames", "2..4"][..], about(2.0, 3.0)),
+        // Frames of both runs are in the folder.
+        (&["--frames", "8", "--resume"], about(2.0, 8.0)),
+        (&["--frames", "0", "--set", "output.trajectory=flight"], about(0.0, 59.0)),
+        (&["--frames", "8", "--set", "imu=[{name = 'imu0'}]"], about(0.0, 59.0)),
+    ] {
+        let (code, err) = render(base.path(), "out", more);
+        assert_eq!(code, 0, "{err}");
+        covers(wanted);
+    }
+    assert_eq!(numbers(&out), [0, 2, 3, 8]);
+}
+
+/// The summary counts every table, and large ones are told before the first frame.
+#[test]
+fn the_size_of_a_run_is_told_with_its_tables() {
+    let base = tempfile::tempdir().unwrap();
+    let (code, err) = render(
+        base.path(),
+        "out",
+        &["--frames", "0", "--set", "output.trajectory=flight", "--set", "tracker.rate_hz=50000"],
+    );
+    assert_eq!(code, 0, "{err}");
+    let size = |name: &str| fs::metadata(base.path().join("out").join(name)).unwrap().len() as f64;
+    let told = format!("{:.1} MB", 1e-6 * (size("trajectory.csv") + size("camera_trajectory.csv")));
+    assert!(err.contains(&format!("trajectories and sensors in out take {told}")), "{told}: {err}");
+}
+
+#[test]
+fn frames_of_a_flight_on_earth_have_latitude_and_longitude() {
+    let base = tempfile::tempdir().unwrap();
+    let (code, err) = render(base.path(), "out", &["--frames", "3"]);
+    assert_eq!(code, 0, "{err}");
+    let row = &frames(&base.path().join("out"))[0];
+    let value = |name: &str| row[name].parse::<f64>().unwrap();
+    let earth = LocalFrame::new(Geodetic::from_deg(38.9492, -107.0698, 2810.0));
+    let place = Geodetic::from_deg(value("lat_deg"), value("lon_deg"), value("height_m"));
+    let away_m = earth.ned_from_geodetic(place) - DVec3::new(value("n"), value("e"), value("d"));
+    assert!(away_m.length() < 1e-6, "{away_m}");
 }
 
 #[test]
@@ -242,6 +312,56 @@ fn partial_runs_share_one_table_and_scenarios_are_not_mixed() {
     assert!(code == 2 && err.contains("no run.json that describes their origin"), "{err}");
 }
 
+/// Waits until a running child has written more than `least` frames.
+#[cfg(unix)]
+fn wait_for_frames(out: &Path, least: usize) -> usize {
+    let begin = Instant::now();
+    loop {
+        let files = fs::read_dir(out.join("rows")).map_or(0, |files| {
+            files.flatten().filter(|file| !file.file_name().to_string_lossy().starts_with('.')).count()
+        });
+        if files > least {
+            return files;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(120), "no frame came");
+        #[allow(clippy::disallowed_methods, reason = "files of another process tell nobody when they come")]
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[cfg(unix)]
+fn send(child: &std::process::Child, signal: rustix::process::Signal) {
+    let process = rustix::process::Pid::from_raw(child.id() as i32).unwrap();
+    rustix::process::kill_process(process, signal).unwrap();
+}
+
+/// What a script has started in the background goes on after Ctrl-C, and SIGTERM stops it after a frame.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_in_the_background_is_stopped_by_sigterm() {
+    let base = tempfile::tempdir().unwrap();
+    let out = base.path().join("out");
+    let pattern = pattern();
+    let args = [
+        &["render", &pattern, "-o", "out", "--outputs", "color,rows"][..],
+        &SMALL,
+        &["--set", "camera.size_px=[64, 48]"],
+    ]
+    .concat();
+    let child = program::in_background(base.path(), &args).spawn().unwrap();
+    let before = wait_for_frames(&out, 0);
+    send(&child, rustix::process::Signal::INT);
+    // The frames under way, and more.
+    wait_for_frames(&out, before + 8);
+    send(&child, rustix::process::Signal::TERM);
+    let (code, err) = wait(child);
+    assert_eq!(code, 130, "{err}");
+    assert_eq!(err.matches("stopping after the frames that are under way").count(), 1, "{err}");
+    assert!(err.contains("to resume: camsim render "), "{err}");
+    let run: serde_json::Value = serde_json::from_slice(&fs::read(out.join("run.json")).unwrap()).unwrap();
+    assert_eq!(run["finished"].as_bool(), Some(false));
+}
+
 #[cfg(unix)]
 #[test]
 fn interrupted_run_reports_progress_and_resume_command() {
@@ -256,24 +376,13 @@ fn interrupted_run_reports_progress_and_resume_command() {
     ]
     .concat();
     let child = spawn(base.path(), &args);
-    let begin = Instant::now();
-    let count = || {
-        fs::read_dir(out.join("rows")).map_or(0, |files| {
-            files.flatten().filter(|file| !file.file_name().to_string_lossy().starts_with('.')).count()
-        })
-    };
-    while count() < 2 {
-        assert!(begin.elapsed() < Duration::from_secs(120), "no frame came");
-        #[allow(clippy::disallowed_methods, reason = "files of another process tell nobody when they come")]
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let process = rustix::process::Pid::from_raw(child.id() as i32).unwrap();
-    rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
+    wait_for_frames(&out, 1);
+    send(&child, rustix::process::Signal::INT);
     let (code, err) = wait(child);
     assert_eq!(code, 130, "{err}");
     assert!(err.contains("stopping after the frames that are under way"), "{err}");
     let message = err.lines().find(|line| line.starts_with("stopped: ")).unwrap_or_else(|| panic!("{err}"));
-    let done = count();
+    let done = wait_for_frames(&out, 1);
     assert!(
         done < 60
             && message.starts_with(&format!(

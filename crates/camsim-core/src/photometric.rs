@@ -1,10 +1,12 @@
 //! Photometric stage: vignette, light, noise and saturation on linear values (section 7 and fig. 9 of the
 //! paper). f64 twin of `shaders/reverse/photometric.wgsl`.
 
+use glam::DVec2;
+
 use crate::{
     exposure::FrameExposure,
     noise::{NOISE_STREAM, normal4},
-    scenario::{CameraSpec, OutputEncoding},
+    scenario::{CameraSpec, FilesOfSpec, OutputEncoding},
     sequence::GrayImage,
 };
 
@@ -68,24 +70,46 @@ pub fn vignette_weight(value: f32, thresholds: [f64; 2]) -> f32 {
 /// thresholds.
 #[must_use]
 pub fn vignette_weights(map: &GrayImage, size_px: [u32; 2], thresholds: [f64; 2]) -> Vec<f32> {
-    let axis = |out: u32, out_size: u32, in_size: u32| {
-        let map_px = ((f64::from(out) + 0.5) * f64::from(in_size) / f64::from(out_size) - 0.5)
-            .clamp(0.0, f64::from(in_size - 1));
+    let place = |x, y| DVec2::new(x, y);
+    let values = resampled(map, size_px, size_px, place);
+    values.into_iter().map(|value| vignette_weight(value, thresholds)).collect()
+}
+
+/// The values of a vignette map in the picture of a camera, which is a part of the picture that the map covers
+/// ([`crate::scenario::CameraSpec::files_of`]).
+#[must_use]
+pub fn vignette_part(map: &GrayImage, files_of: &FilesOfSpec, size_px: [u32; 2]) -> GrayImage {
+    let place = |x, y| files_of.point(DVec2::new(x, y), size_px);
+    GrayImage { size_px, values: resampled(map, size_px, files_of.size_px, place) }
+}
+
+/// Values of a map, which covers a picture of the size `covered_px`, at the places in it that the pixels of a
+/// picture have: bilinear between pixel centres, constant beyond the borders.
+fn resampled(
+    map: &GrayImage,
+    [width, height]: [u32; 2],
+    covered_px: [u32; 2],
+    place: impl Fn(f64, f64) -> DVec2,
+) -> Vec<f32> {
+    let axis = |at: f64, covered: u32, in_size: u32| {
+        let map_px =
+            ((at + 0.5) * f64::from(in_size) / f64::from(covered) - 0.5).clamp(0.0, f64::from(in_size - 1));
         let low = map_px.floor() as u32;
         (low, (low + 1).min(in_size - 1), (map_px - map_px.floor()) as f32)
     };
     let value = |x: u32, y: u32| map.values[(y * map.size_px[0] + x) as usize];
-    let mut weights = Vec::with_capacity((size_px[0] * size_px[1]) as usize);
-    for y in 0..size_px[1] {
-        let (y0, y1, ty) = axis(y, size_px[1], map.size_px[1]);
-        for x in 0..size_px[0] {
-            let (x0, x1, tx) = axis(x, size_px[0], map.size_px[0]);
+    let mut values = Vec::with_capacity((width * height) as usize);
+    for y in 0..height {
+        for x in 0..width {
+            let at = place(f64::from(x), f64::from(y));
+            let (x0, x1, tx) = axis(at.x, covered_px[0], map.size_px[0]);
+            let (y0, y1, ty) = axis(at.y, covered_px[1], map.size_px[1]);
             let top = value(x0, y0) + tx * (value(x1, y0) - value(x0, y0));
             let bottom = value(x0, y1) + tx * (value(x1, y1) - value(x0, y1));
-            weights.push(vignette_weight(top + ty * (bottom - top), thresholds));
+            values.push(top + ty * (bottom - top));
         }
     }
-    weights
+    values
 }
 
 /// Whether the output is a single luminance channel.
@@ -138,6 +162,26 @@ mod tests {
         for (i, weight) in weights.iter().enumerate() {
             assert!((weight - expected[i % 8]).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn the_map_of_a_part_has_the_values_of_its_points() {
+        // Half as many columns as the picture that it covers, with a ramp in each direction.
+        let ramp = |k: usize| (k % 20) as f32 + 100.0 * (k / 20) as f32;
+        let map = GrayImage { size_px: [20, 30], values: (0..600).map(ramp).collect() };
+        let files_of = FilesOfSpec {
+            size_px: [40, 30],
+            focal_px: [50.0; 2],
+            principal_point_px: [19.5, 14.5],
+            part_px: [8.0, 6.0, 24.0, 18.0],
+        };
+        let part = vignette_part(&map, &files_of, [12, 9]);
+        for (i, value) in part.values.iter().enumerate() {
+            // A pixel is one of 2 x 2 from (8, 6) on, and a column of the map is two of the picture.
+            let (column, row) = (4 + i % 12, 6.5 + 2.0 * (i / 12) as f32);
+            assert!((value - (column as f32 + 100.0 * row)).abs() < 1e-3, "{i}: {value}");
+        }
+        assert_eq!(part.size_px, [12, 9]);
     }
 
     #[test]

@@ -21,6 +21,7 @@ mod image_sensor;
 mod motion;
 mod optics;
 mod point_spread;
+mod resized;
 mod rig;
 mod scene;
 mod sensors;
@@ -47,6 +48,7 @@ pub use image_sensor::{
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use optics::{ChromaticSpec, ImageCircleSpec, Primary, PrimaryLensSpec, VignettingSpec};
 pub use point_spread::PointSpreadSpec;
+pub use resized::{Binning, FilesOfSpec, ResizedSpec, Resizing};
 pub use rig::Rig;
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,
@@ -61,7 +63,7 @@ pub use tracks::{PointSource, TracksSpec};
 pub use twin::{BurstOver, MAX_INSTANTS, TwinShutter, TwinSpec};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem,
-    validate, validate_camera, validate_cameras, validate_rig,
+    checked_camera, checked_cameras, checked_rig, validate, validate_camera, validate_cameras, validate_rig,
 };
 pub use video::{ImageFormat, RawFormat, VideoCodec, VideoSpec};
 
@@ -495,6 +497,9 @@ pub struct OutputSpec {
     pub stamps: Stamps,
     /// With `stamps = "zero"`: time of that clock at the begin of the window, nanoseconds.
     pub epoch_ns: u64,
+    /// Time that the trajectories cover.
+    #[serde(skip_serializing_if = "TrajectorySpan::is_frames")]
+    pub trajectory: TrajectorySpan,
     /// Pixel type of EXR colour.
     pub exr_pixel: ExrPixel,
     /// EXR compression.
@@ -531,6 +536,7 @@ impl Default for OutputSpec {
             format: vec![ImageFormat::Exr],
             stamps: Stamps::Log,
             epoch_ns: 0,
+            trajectory: TrajectorySpan::Frames,
             exr_pixel: ExrPixel::Half,
             exr_compression: ExrCompression::Zip1,
             raw_format: RawFormat::Png,
@@ -554,6 +560,23 @@ pub enum Stamps {
     Log,
     /// A clock that shows [`OutputSpec::epoch_ns`] at the begin of `flight.window_s`.
     Zero,
+}
+
+/// Time that `trajectory.csv` and `camera_trajectory.csv` cover.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrajectorySpan {
+    /// That of the frames in the folder; with sensors beside the camera, that of the flight.
+    #[default]
+    Frames,
+    /// All of `flight.window_s`.
+    Flight,
+}
+
+impl TrajectorySpan {
+    fn is_frames(&self) -> bool {
+        *self == Self::Frames
+    }
 }
 
 impl OutputSpec {

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use camsim_core::{
     camera::CameraModel,
     lens::{GridOf, LensGrid, LensGridError, LensModel, RayChart},
-    scenario::CameraSpec,
+    scenario::{CameraSpec, FilesOfSpec},
 };
 use glam::DVec2;
 
@@ -79,7 +79,12 @@ struct Pixels {
 }
 
 impl Pixels {
+    /// Those of the camera's picture, or of the other one that the table is of.
     fn new(camera: &CameraSpec) -> Self {
+        if let Some(FilesOfSpec { size_px, focal_px, principal_point_px, .. }) = camera.files_of {
+            let size_px = DVec2::from(size_px.map(f64::from));
+            return Self { size_px, focal_px: focal_px.into(), principal_px: principal_point_px.into() };
+        }
         let size_px = DVec2::from(camera.size_px.map(f64::from));
         let principal_px = camera.principal_point_px.map_or(0.5 * (size_px - 1.0), DVec2::from);
         Self { size_px, focal_px: camera.focal_px.into(), principal_px }
@@ -264,7 +269,7 @@ mod tests {
 
     use camsim_core::{
         lens::LensTable,
-        scenario::{LensSpec, validate_camera},
+        scenario::{Binning, LensSpec, ResizedSpec, Resizing, validate_camera},
     };
 
     use super::*;
@@ -341,6 +346,39 @@ mod tests {
         assert!(error_px < 2e-3, "{error_px} px");
         let centre = DVec2::new(300.3, 100.7);
         assert!((table.unproject(centre).unwrap() - exact.unproject(centre).unwrap()).length() < 1e-6);
+    }
+
+    #[test]
+    fn a_table_of_the_calibrated_picture_serves_a_resized_camera() {
+        let folder = tempfile::tempdir().unwrap();
+        let (csv, map) = (folder.path().join("lens.csv"), folder.path().join("map.exr"));
+        let bare = camera(LensModel::BrownConrady, &[-0.28, 0.07, 2e-4, 2e-5]);
+        let exact = CameraModel::from_spec(&bare).unwrap();
+        std::fs::write(&csv, lens_table_csv(&exact, 97)).unwrap();
+        let pinhole = CameraModel::from_spec(&camera(LensModel::Pinhole, &[])).unwrap();
+        let texel = |x: usize, y: usize| {
+            let place = pinhole.project(exact.unproject(DVec2::new(x as f64, y as f64)).unwrap()) + 0.5;
+            ((place.x / 752.0) as f32, (1.0 - place.y / 480.0) as f32, 0.0_f32)
+        };
+        exr::prelude::write_rgb_file(&map, 752, 480, texel).unwrap();
+        let crop_px = Some([101, 51, 602, 402]);
+        let resized = ResizedSpec { crop_px, binning: Some(Binning::Both(2.0)), ..ResizedSpec::default() };
+        let change = Resizing::new(&resized, bare.size_px).unwrap();
+        for path in [&csv, &map] {
+            let whole = with_table(&bare, path).unwrap();
+            let part = CameraSpec { resized: Some(resized.clone()), ..bare.clone() };
+            let lens_table = Some(LensTable { path: path.clone(), grid: None });
+            let lens = LensSpec { model: LensModel::Table, coefficients: Vec::new() };
+            let mut part = CameraSpec { lens, lens_table, ..part }.resized().unwrap();
+            load_lens_table(&mut part).unwrap();
+            let part = CameraModel::from_spec(&part).unwrap();
+            for k in 0..16 * 12 {
+                let at = DVec2::new(f64::from(k % 16) * 20.0, f64::from(k / 16) * 18.0);
+                let [own, of_whole] =
+                    [part.ray(at), whole.ray(change.calibrated_point(at))].map(Option::unwrap);
+                assert!((own - of_whole).length() < 1e-9, "{}: {at}", path.display());
+            }
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::{
     gltf_file::{GltfError, MAX_RADIUS_M},
     kernel_file::{KernelFileError, load_kernel},
     lens_table::{LensTableError, load_lens_table},
-    pictures::{PictureError, read_gray_image},
+    pictures::{PictureError, read_vignette},
     terrain::{TerrainFileError, TerrainSummary},
 };
 use camsim_core::{
@@ -16,7 +16,7 @@ use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
     scenario::{
-        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Rig, Scenario,
+        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Problem, Rig, Scenario,
         TrackerKind,
     },
     sensors::{SensorError, Sensors},
@@ -71,6 +71,9 @@ pub enum LoadError {
     /// The mount is not valid.
     #[error(transparent)]
     Mount(#[from] MountError),
+    /// `camera.resized` cannot be applied.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+    Resized(Vec<Problem>),
     /// The terrain cannot be read.
     #[error(transparent)]
     Terrain(#[from] TerrainFileError),
@@ -298,6 +301,10 @@ pub fn reload_sequence(scenario: &Scenario, before: &Loaded) -> Result<Loaded, L
 }
 
 fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, LoadError> {
+    if scenario.camera.resized.is_some() {
+        let camera = scenario.camera.resized().map_err(LoadError::Resized)?;
+        return load_or_reuse(&Scenario { camera, ..scenario.clone() }, before);
+    }
     let reusable = before.map(|before| (before, &before.sequence.scenario));
     let (log, trajectory, tracked) = match reusable.filter(|(_, old)| reads_same_flight(old, scenario)) {
         Some((before, _)) => {
@@ -331,13 +338,10 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     if scene.objects.len() > MAX_OBJECTS && scenario.output.all_channels().any(numbers_objects) {
         return Err(LoadError::TooManyObjects(scene.objects.len()));
     }
-    let vignette_path = &scenario.camera.photometric.vignette;
     let vignette_error = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
-    let vignette = match reusable.filter(|(_, old)| old.camera.photometric.vignette == *vignette_path) {
+    let vignette = match reusable.filter(|(_, old)| has_same_vignette(&old.camera, &scenario.camera)) {
         Some((before, _)) => before.sequence.vignette.clone(),
-        None => {
-            vignette_path.as_deref().map(read_gray_image).transpose().map_err(vignette_error)?.map(Arc::new)
-        }
+        None => read_vignette(&scenario.camera).map_err(vignette_error)?.map(Arc::new),
     };
     let zoom_track = load_zoom_track(scenario, &log)?;
     let tracks = TrackInputs::load(scenario, &log)?;
@@ -376,6 +380,12 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         }),
     );
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, tracks, sensors, warnings, scene_notes })
+}
+
+/// Whether two cameras have the same map of the same part of a picture.
+fn has_same_vignette(a: &CameraSpec, b: &CameraSpec) -> bool {
+    let is_of_same_part = a.files_of == b.files_of && (a.files_of.is_none() || a.size_px == b.size_px);
+    a.photometric.vignette == b.photometric.vignette && is_of_same_part
 }
 
 /// Whether anything moves by a table of poses, whose times are on the log's clock.

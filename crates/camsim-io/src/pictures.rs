@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
+    photometric::vignette_part,
+    scenario::CameraSpec,
     scene::{Encoding, Texture},
     sequence::GrayImage,
 };
@@ -117,6 +119,20 @@ pub(crate) fn oriented(texture: Texture, orientation: u64) -> Texture {
     let mut picture = DynamicImage::ImageRgba8(picture);
     picture.apply_orientation(transform);
     Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_rgba8().into_raw(), encoding }
+}
+
+/// Reads the vignette map of a camera: of a part of the picture that the map covers, that part
+/// ([`CameraSpec::files_of`]).
+///
+/// # Errors
+/// As [`read_gray_image`].
+pub fn read_vignette(camera: &CameraSpec) -> Result<Option<GrayImage>, PictureError> {
+    let Some(path) = &camera.photometric.vignette else { return Ok(None) };
+    let map = read_gray_image(path)?;
+    Ok(Some(match &camera.files_of {
+        Some(files_of) => vignette_part(&map, files_of, camera.size_px),
+        None => map,
+    }))
 }
 
 /// Reads a picture as grey values 0..=1, without undoing a transfer function. For vignettes. Colours become

@@ -7,7 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
-use camsim_core::scenario::{CameraSpec, Preset, Problem, Rig, Scenario, validate_camera, validate_rig};
+use camsim_core::scenario::{CameraSpec, Preset, Problem, Rig, Scenario, checked_camera, checked_rig};
 use thiserror::Error;
 
 pub(crate) mod check;
@@ -156,7 +156,7 @@ fn single(rig: Rig, path: &Path) -> Result<Scenario, ScenarioError> {
 }
 
 /// Reads a camera file, which has the keys of `[camera]` at its root. Paths are resolved; ranges are not
-/// checked.
+/// checked, and `resized` is not applied.
 ///
 /// # Errors
 /// As [`read_scenario`].
@@ -189,16 +189,15 @@ pub fn read_cameras(path: &Path) -> Result<Vec<CameraSpec>, ScenarioError> {
     rig::read_cameras_alone(tree)
 }
 
-/// Reads a camera file and checks the ranges of all values.
+/// Reads a camera file, checks the ranges of all values, and applies `resized`.
 ///
 /// # Errors
 /// As [`read_camera`], or values are out of range.
 pub fn read_checked_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
-    let camera = read_camera(path)?;
-    let problems = validate_camera(&camera);
-    if problems.is_empty() {
-        return Ok(camera);
-    }
+    let problems = match checked_camera(read_camera(path)?) {
+        Ok(camera) => return Ok(camera),
+        Err(problems) => problems,
+    };
     // The keys of a camera file stand at its root.
     let line = |problem: &Problem| {
         format!("{}: {}", path.display(), problem.to_string().trim_start_matches("camera."))
@@ -218,13 +217,21 @@ pub fn keys() -> &'static [(&'static str, ValueKind)] {
     schema::SCENARIO.keys
 }
 
-/// Turns a tree into checked scenarios.
-fn rig_of_tree(mut tree: Tree, preset: Option<Preset>) -> Result<Rig, ScenarioError> {
-    let problems = check::check(&mut tree, &schema::SCENARIO, "");
+/// Turns a tree into checked scenarios, with `camera.resized` applied.
+fn rig_of_tree(tree: &mut Tree, preset: Option<Preset>) -> Result<Rig, ScenarioError> {
+    checked_rig(stated_rig(tree, preset)?).map_err(|problems| {
+        let line = |problem: &Problem| format!("{}: {problem}", tree.location(&problem.key));
+        ScenarioError::Problems(problems.iter().map(line).collect())
+    })
+}
+
+/// Turns a tree into scenarios as they are stated. Ranges are not checked.
+fn stated_rig(tree: &mut Tree, preset: Option<Preset>) -> Result<Rig, ScenarioError> {
+    let problems = check::check(tree, &schema::SCENARIO, "");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));
     }
-    let mut rig = rig_of_table(tree.root.clone()).map_err(|error| unexpected(&tree, &error))?;
+    let mut rig = rig_of_table(tree.root.clone()).map_err(|error| unexpected(tree, &error))?;
     if let Some(preset) = preset {
         let with_preset = |mut scenario: Scenario| {
             scenario.quality.preset = preset;
@@ -232,13 +239,7 @@ fn rig_of_tree(mut tree: Tree, preset: Option<Preset>) -> Result<Rig, ScenarioEr
         };
         rig = rig.try_map(with_preset)?;
     }
-    let problems = validate_rig(&rig);
-    if problems.is_empty() {
-        return Ok(rig);
-    }
-    Err(ScenarioError::Problems(
-        problems.iter().map(|problem| format!("{}: {problem}", tree.location(&problem.key))).collect(),
-    ))
+    Ok(rig)
 }
 
 /// Deserialises a checked tree. The schema and the structs agree, so an error here is unexpected and names no

@@ -51,6 +51,11 @@ impl Doubt {
         Self { value: Some(format!("{value:?}")), ..Self::new(key, problem) }
     }
 
+    /// Key below `camera`.
+    pub(crate) fn key(&self) -> &str {
+        self.key
+    }
+
     /// What to say if a calibration has the value and is refused for it; `None` if it is only told.
     pub(crate) fn refusal(&self) -> Option<String> {
         let value = self.value.as_ref().filter(|_| self.is_impossible)?;
@@ -73,7 +78,8 @@ pub(crate) fn doubts(camera: &CameraSpec) -> Vec<Doubt> {
     if camera.zoom.is_empty() {
         all.extend(field_doubt(camera));
         all.extend(ratio_doubt(camera));
-        all.extend(principal_point::doubt(camera));
+        // A part of a picture may have its axis anywhere.
+        all.extend((!camera.is_part).then(|| principal_point::doubt(camera)).flatten());
     }
     all.extend(lens::doubts(camera));
     all.extend(arm_doubt(camera));

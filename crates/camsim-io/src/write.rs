@@ -70,7 +70,9 @@ pub(crate) use atomic::{remove_all_temporaries, temporary_path, write_atomic_wit
 pub use channel_pictures::channel_pictures;
 pub use encode::{luminance, srgb_from_linear, srgb8};
 pub(crate) use exr_file::encode as encode_exr;
-pub use frame_table::{FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path};
+pub use frame_table::{
+    FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path, listed_frames,
+};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
 pub use numbers::Number;
 pub use picture::write_picture;

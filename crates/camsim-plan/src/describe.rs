@@ -147,18 +147,23 @@ impl FramePlan {
     }
 }
 
+impl FramePlan {
+    /// The way from the pose of the ideal frame, which is another than that within the frame where several frames
+    /// share one.
+    fn write_departure(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Motion { travel_m, rotation_rad, parallax_px, rotation_px, .. } = self.motion;
+        writeln!(f, "motion from the pose of the ideal frame, which frames may share")?;
+        writeln!(f, "  travel {travel_m:.4} m, rotation {:.4} deg", rotation_rad.to_degrees())?;
+        writeln!(
+            f,
+            "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)"
+        )
+    }
+}
+
 impl fmt::Display for FramePlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Motion {
-            nearest_m,
-            travel_m,
-            rotation_rad,
-            parallax_px,
-            rotation_px,
-            blur_px,
-            blur_sagitta_px,
-            ..
-        } = self.motion;
+        let Motion { nearest_m, blur_px, blur_sagitta_px, own, .. } = self.motion;
         let [width, height] = self.camera.size_px;
         writeln!(f, "frame {} at {:.6} s of the flight, {width}x{height} px", self.frame, self.stamp_s)?;
         let outside = if self.extrapolated {
@@ -177,17 +182,20 @@ impl fmt::Display for FramePlan {
         writeln!(f, "motion within the frame")?;
         writeln!(
             f,
-            "  travel {travel_m:.4} m, rotation {:.4} deg, nearest surface at least {nearest_m:.1} m away",
-            rotation_rad.to_degrees()
+            "  travel {:.4} m, rotation {:.4} deg, nearest surface at least {nearest_m:.1} m away",
+            own.travel_m,
+            own.rotation_rad.to_degrees()
         )?;
         writeln!(
             f,
-            "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)"
+            "  moves a pixel by at most {:.3} px (rotation) + {:.3} px (parallax)",
+            own.rotation_px, own.parallax_px
         )?;
         writeln!(
             f,
             "  longest blur path {blur_px:.3} px; a straight line differs from it by at most {blur_sagitta_px:.2e} px"
         )?;
+        self.write_departure(f)?;
         write_prediction(&self.predicted, f)?;
         for cause in self.not_in_the_picture() {
             writeln!(f, "  not in it: {cause}")?;

@@ -53,7 +53,7 @@ pub use ir::{
     key_frame::KeyFrame,
     limits::{MAX_IDEAL_PX, MAX_KEYS, NEAR_M, SIZE_QUANTUM_PX},
     linear_fog::LinearFog,
-    motion::Motion,
+    motion::{Departure, Motion},
     placement::{AdapterClass, Backend, Capabilities, Placement, Renderer},
     plan_error::PlanError,
     predicted::{BlendedDepthError, Disocclusion, Predicted, SilhouetteError, TerrainError},

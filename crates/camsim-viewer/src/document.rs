@@ -9,7 +9,7 @@ use std::{
     sync::Arc,
 };
 
-use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, validate_rig};
+use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, checked_rig};
 use camsim_io::{
     scenario_file::{CAMERAS, ValueKind, keys, read_random_scenario, rig_of_table, rig_table},
     write::write_atomic,
@@ -307,15 +307,17 @@ impl Document {
 
     /// Validates the tree, and takes it as the scenario if it is legal.
     fn validate_tree(&mut self) {
-        let read = rig_of_table(self.tree.clone());
-        self.problems = match &read {
-            Ok(rig) => validate_rig(rig),
-            Err(error) => vec![Problem { key: String::new(), message: error.message().to_owned() }],
+        let of_key = |error: toml::de::Error| {
+            vec![Problem { key: String::new(), message: error.message().to_owned() }]
         };
-        if let (Ok(rig), true) = (read, self.problems.is_empty()) {
-            self.rig = rig;
-            self.camera = self.camera.min(self.rig.scenarios().len() - 1);
-            self.scenario = Arc::new(self.rig.scenarios()[self.camera].clone());
+        match rig_of_table(self.tree.clone()).map_err(of_key).and_then(checked_rig) {
+            Ok(rig) => {
+                self.problems.clear();
+                self.rig = rig;
+                self.camera = self.camera.min(self.rig.scenarios().len() - 1);
+                self.scenario = Arc::new(self.rig.scenarios()[self.camera].clone());
+            }
+            Err(problems) => self.problems = problems,
         }
     }
 }

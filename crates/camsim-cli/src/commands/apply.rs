@@ -10,7 +10,7 @@ use camsim_core::{
 use camsim_io::{
     frame_file::{FrameFile, FrameSet, read_frame_set},
     load::vignette_warnings,
-    pictures::read_gray_image,
+    pictures::read_vignette,
     scenario_file::read_checked_camera,
     write::write_picture,
 };
@@ -18,7 +18,7 @@ use camsim_io::{
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
-    frame_list::FrameList,
+    frame_list::{FrameList, whole_number},
     inputs::PresetArg,
 };
 
@@ -92,11 +92,11 @@ pub struct ApplyArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_BLUR_SAMPLES)))]
     blur_samples: Option<u32>,
     /// Seed of the noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole_number, allow_hyphen_values = true)]
     seed: u64,
     /// For several frames, a selection: 7, 10..20 (without 20), 10..=20, 10.. or several with commas
     /// [default: all]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     frames: Option<FrameList>,
     /// For several frames: keep those that exist already; refused if the folder belongs to other inputs
     #[arg(long)]
@@ -105,7 +105,7 @@ pub struct ApplyArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     format: Vec<folder::ImageFormatArg>,
     /// Number of the (first) frame, which the noise depends on
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole_number, allow_hyphen_values = true)]
     frame_number: u64,
 }
 
@@ -166,7 +166,7 @@ pub fn run(args: &ApplyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     warn_of_one_lens(&spec, args, console);
     let set = read_frame_set(&args.frame).or_bad_input()?;
     set.notes().iter().for_each(|note| console.warn(note));
-    let vignette = spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_bad_input()?;
+    let vignette = read_vignette(&spec).or_bad_input()?;
     vignette.iter().flat_map(|map| vignette_warnings(&spec, map)).for_each(|warning| console.warn(warning));
     if set.is_several() {
         return folder::run(args, &spec, &set, vignette.as_ref(), console);

@@ -65,7 +65,7 @@ struct ShardArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Frames, as of `camsim render` [default: all]
-    #[arg(long, value_name = "LIST", value_parser = frame_list)]
+    #[arg(long, value_name = "LIST", value_parser = frame_list, allow_hyphen_values = true)]
     frames: Option<String>,
     /// Further options of `camsim render`, after --
     #[arg(last = true, value_name = "OPTIONS")]

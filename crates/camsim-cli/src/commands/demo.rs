@@ -83,6 +83,7 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         variation: None,
         camera: None,
         sequence: &loaded.sequence,
+        earth: loaded.log.frame,
         tracks: &loaded.tracks,
         sensors: Some(&loaded.sensors),
         folder,

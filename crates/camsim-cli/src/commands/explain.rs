@@ -22,7 +22,7 @@ use crate::{
     backend::BackendArgs,
     console::Console,
     failure::{Failure, OrFail},
-    frame_list::FrameListError,
+    frame_list::{FrameListError, whole_number},
     inputs::{self, ScenarioArgs},
     render_run::source_frame,
 };
@@ -38,7 +38,7 @@ pub struct ExplainArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
     /// Frame number, from 0
-    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole_number, allow_hyphen_values = true)]
     frame: u64,
     /// Print JSON
     #[arg(long)]

@@ -11,7 +11,7 @@ use super::render::{RenderArgs, RenderBackend, render};
 use crate::{
     console::{Console, quoted},
     failure::{Failure, OrFail},
-    frame_list::FrameList,
+    frame_list::{FrameList, whole_number},
     inputs::{self, Changes},
     interrupt,
     progress::frames_bar,
@@ -43,7 +43,7 @@ pub struct ExportArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Frames of a scenario to render: 7, 10..20 (without 20) ... [default: all]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     frames: Option<FrameList>,
     /// Cameras of a rig, by their names [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
@@ -54,7 +54,7 @@ pub struct ExportArgs {
     #[command(flatten)]
     changes: Changes,
     /// Variation of a scenario with [randomize] [default: without what is drawn]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = whole_number, allow_hyphen_values = true)]
     variation: Option<u64>,
     /// Renderer of a scenario
     #[arg(long, value_enum)]

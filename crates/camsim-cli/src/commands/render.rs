@@ -65,7 +65,7 @@ pub struct RenderArgs {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Frames of each camera: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: all]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     frames: Option<FrameList>,
     /// Cameras of a scenario with [[cameras]], by their names [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -103,7 +103,7 @@ pub struct RenderArgs {
     pipe: bool,
     /// Variations of a scenario with [randomize], each into a folder DIR/variation_000017: 17, 0..100 (without 100)
     /// ... [default: all, if randomize.variations says how many]
-    #[arg(long, visible_alias = "variation", value_name = "LIST")]
+    #[arg(long, visible_alias = "variation", value_name = "LIST", allow_hyphen_values = true)]
     variations: Option<FrameList>,
     /// Print a scenario with every key, its default and its meaning, and exit
     #[arg(long, exclusive = true)]

@@ -72,7 +72,7 @@ pub struct VerifyArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
     /// Frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas [default: five, evenly spread]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     frames: Option<FrameList>,
     /// Measure the picture error too; the reference renderer casts many rays per pixel
     #[arg(long)]

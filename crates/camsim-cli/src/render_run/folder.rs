@@ -80,8 +80,13 @@ pub fn folder_state(job: &Job<'_>, pictures: &Pictures) -> Result<FolderState, F
 
 /// Whether a key only selects files, without changing their contents.
 fn is_of_files(difference: &str) -> bool {
-    const OUTPUT: [&str; 4] =
-        ["output.channels was ", "output.format was ", "output.palette was ", "output.tracks"];
+    const OUTPUT: [&str; 5] = [
+        "output.channels was ",
+        "output.format was ",
+        "output.palette was ",
+        "output.tracks",
+        "output.trajectory was ",
+    ];
     const SENSORS: [&str; 4] = ["imu was ", "gnss was ", "barometer was ", "magnetometer was "];
     OUTPUT.iter().chain(&SENSORS).any(|key| difference.starts_with(key))
 }

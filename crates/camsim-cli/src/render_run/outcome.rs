@@ -13,7 +13,7 @@ pub struct Outcome {
     pub twins: u64,
     /// Frames that existed already.
     pub skipped: u64,
-    /// Bytes of frame files.
+    /// Bytes of the files of frames, trajectories and sensors.
     pub bytes: u64,
     /// From the first submission until the last file was written, without the tables of twins.
     pub time: Duration,

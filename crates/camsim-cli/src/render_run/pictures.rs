@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use camsim_core::{scenario::TwinSpec, sequence::Sequence};
+use camsim_core::{geodesy::LocalFrame, scenario::TwinSpec, sequence::Sequence};
 use camsim_io::{
     inputs::{self, Inputs},
     manifest::TwinRecord,
@@ -23,6 +23,8 @@ pub struct Pictures {
     pub twin: Option<TwinRecord>,
     /// The sequence of `run.json`.
     pub sequence: Arc<Sequence>,
+    /// Where on Earth its local frame lies, if that is known.
+    pub earth: Option<LocalFrame>,
     /// Fingerprints of the files that its scenario names.
     pub inputs: Inputs,
     /// Series of pictures: one, or one for each instant of a burst.
@@ -70,6 +72,7 @@ impl Pictures {
             camera: job.camera.map(str::to_owned),
             folder: job.folder.into(),
             twin: None,
+            earth: job.earth,
             inputs: inputs::scenario_fingerprints(&sequence.scenario),
             series: vec![Series { sequence: sequence.clone(), files }],
             sequence,
@@ -89,7 +92,8 @@ impl Pictures {
         }
         let inputs = inputs::scenario_fingerprints(&sequence.scenario);
         let camera = job.camera.map(str::to_owned);
-        Ok(Self { camera, folder, twin: Some(TwinRecord::new(twin)), sequence, inputs, series })
+        let twin = Some(TwinRecord::new(twin));
+        Ok(Self { camera, folder, twin, sequence, earth: job.earth, inputs, series })
     }
 
     /// Name of the twin.

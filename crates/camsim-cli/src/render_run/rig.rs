@@ -71,10 +71,11 @@ impl Selected<'_> {
         let parts = self.cameras.iter().zip(&folders).zip(&self.frames);
         let jobs: Vec<Job<'_>> = parts
             .map(|((&camera, folder), frames)| {
-                let Loaded { sequence, tracks, sensors, warnings, .. } = &loaded[camera];
+                let Loaded { sequence, log, tracks, sensors, warnings, .. } = &loaded[camera];
                 Job {
                     camera: name(camera),
                     sequence,
+                    earth: log.frame,
                     tracks,
                     // Those of a rig are in its own folder.
                     sensors: (!rig.is_list()).then_some(sensors),
@@ -134,22 +135,45 @@ impl RigFolder<'_> {
     }
 
     /// Writes the files before the first frame.
-    pub fn write_begin(&self, jobs: &[Job<'_>], inputs: &Inputs, adapter: &str) -> Result<(), Failure> {
+    pub fn write_begin(
+        &self,
+        jobs: &[Job<'_>],
+        inputs: &Inputs,
+        adapter: &str,
+        console: &mut Console<'_>,
+    ) -> Result<(), Failure> {
         let _lock = Lock::take(self.folder)?;
         write_rig(self.folder, self.rig).or_failed()?;
-        let sequences: Vec<_> = self.loaded.iter().map(|loaded| &*loaded.sequence).collect();
-        tables::write_platform(self.folder, &sequences)?;
+        self.write_platform(jobs)?;
         if let Some(loaded) = self.loaded.first() {
             write_sensors(self.folder, &loaded.sensors).or_failed()?;
         }
+        tables::tell_size(self.folder, console);
         self.write_run(jobs, inputs, adapter, false)
     }
 
     /// Writes the files after the last frame.
     pub fn write_end(&self, jobs: &[Job<'_>], inputs: &Inputs, adapter: &str) -> Result<(), Failure> {
         let _lock = Lock::take(self.folder)?;
+        if jobs.iter().any(tables::has_others) {
+            self.write_platform(jobs)?;
+        }
         let finished = self.rig.names().all(|name| is_finished(&self.of_camera(name)));
         self.write_run(jobs, inputs, adapter, finished)
+    }
+
+    /// Writes the trajectory for the frames of these and of earlier runs.
+    fn write_platform(&self, jobs: &[Job<'_>]) -> Result<(), Failure> {
+        let of_camera = |loaded: &'_ Loaded| {
+            let name = &loaded.sequence.scenario.camera.name;
+            let job = jobs.iter().find(|job| job.camera == Some(name));
+            let frames = job.map_or(&[][..], |job| job.frames);
+            let has_sensors = !loaded.sensors.is_empty();
+            tables::covered_frames(&loaded.sequence, frames, &self.of_camera(name), has_sensors)
+        };
+        let covered: Vec<_> =
+            self.loaded.iter().map(|loaded| (&*loaded.sequence, of_camera(loaded))).collect();
+        tables::write_platform(self.folder, &covered)
     }
 
     fn write_run(

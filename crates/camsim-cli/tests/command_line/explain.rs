@@ -27,6 +27,29 @@ fn explain_prints_the_frame_of_source_coordinates() {
 }
 
 #[test]
+fn motion_within_a_frame_is_its_own_whatever_ideal_frame_it_shares() {
+    let scenario = assets().join("demo.toml");
+    let explain = |more: &[&str]| {
+        let (code, out, err) = camsim([&["explain", text(&scenario), "--frame", "20"][..], more].concat());
+        assert_eq!(code, 0, "{err}");
+        out
+    };
+    let motion = |more: &[&str]| -> serde_json::Value {
+        let out = explain(&[more, &["--json"]].concat());
+        serde_json::from_str::<serde_json::Value>(&out).unwrap()["plan"]["motion"].take()
+    };
+    let (shared, alone) = (motion(&[]), motion(&["--set", "quality.frames_per_ideal=1"]));
+    let metres = |motion: &serde_json::Value| motion["travel_m"].as_f64().unwrap();
+    assert_eq!(metres(&shared["own"]), metres(&alone["own"]));
+    assert_eq!(shared["own"]["rotation_rad"], alone["own"]["rotation_rad"]);
+    assert!(metres(&shared) > 2.0 * metres(&shared["own"]), "{shared}");
+    // From the middle of its own window a frame gets half as far as from its beginning, but for the vibration.
+    assert!((metres(&alone) / metres(&alone["own"]) - 0.5).abs() < 0.05, "{alone}");
+    let wanted = format!("motion within the frame\n  travel {:.4} m, rotation", metres(&shared["own"]));
+    assert!(explain(&[]).contains(&wanted), "{wanted}");
+}
+
+#[test]
 fn the_field_of_view_and_the_range_of_the_sensor_are_told() {
     let scenario = assets().join("pattern.toml");
     let mut args = vec!["explain", text(&scenario)];

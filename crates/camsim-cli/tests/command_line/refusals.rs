@@ -63,6 +63,21 @@ fn invalid_input_is_refused_with_place_and_remedy() {
         (vec!["render", &demo, "--set", "scene.terrain.dem=none.tif"], "; check scene.terrain.dem"),
         (vec!["render", &demo, "--set", &no_heights], "check scene.terrain.dem"),
         (vec!["render", &demo, "--set", "scene.terrain.ortho=none.jpg"], "; check scene.terrain.ortho"),
+        (
+            vec!["explain", &scenario, "--frame", "-1"],
+            "'--frame <N>': it is a number that counts from 0, such as 7",
+        ),
+        (vec!["explain", &scenario, "--variation", "-1"], "it is a number that counts from 0"),
+        (vec!["render", &scenario, "--frames", "-1"], "`-1` is not a range of frames, which count from 0"),
+        (vec!["verify", &scenario, "--frames", "-3..2"], "`-3..2` is not a range of frames"),
+        (
+            vec!["export", &scenario, "--as", "tum", "-o", "x", "--frames", "1.5"],
+            "`1.5` is not a range of frames",
+        ),
+        (
+            vec!["render", &scenario, "--set", "camera.resized.binning=1.5"],
+            "another factor is camera.resized.scale",
+        ),
         (vec!["explain", &scenario, "--set", "scene.pattern.image=none.png"], "; check scene.pattern.image"),
         (
             vec!["explain", &scenario, "--set", "camera.photometric.vignette=none.png"],

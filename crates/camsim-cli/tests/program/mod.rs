@@ -35,9 +35,26 @@ pub fn spawn(folder: &Path, args: &[&str]) -> Child {
     program(folder, args).spawn().unwrap()
 }
 
-/// The program, not started.
+/// The program, not started. Ctrl-C stops it, also where the tests run in the background of a script, which ignores
+/// that.
 pub fn program(folder: &Path, args: &[&str]) -> Command {
-    let mut program = Command::new(std::env::current_exe().unwrap());
+    with_interrupt("--default-signal=INT", folder, args)
+}
+
+/// The program as scripts start it in the background: Ctrl-C is ignored.
+#[cfg(target_os = "linux")]
+pub fn in_background(folder: &Path, args: &[&str]) -> Command {
+    with_interrupt("--ignore-signal=INT", folder, args)
+}
+
+/// The program; `option` is that of `env` for the signal.
+fn with_interrupt(option: &str, folder: &Path, args: &[&str]) -> Command {
+    let this = std::env::current_exe().unwrap();
+    let mut program =
+        if cfg!(target_os = "linux") { Command::new("/usr/bin/env") } else { Command::new(&this) };
+    if cfg!(target_os = "linux") {
+        program.arg(option).arg(this);
+    }
     program
         .args(["--exact", "program::runs_as_the_program", "--nocapture"])
         .env(ARGS, args.join(&BETWEEN.to_string()))

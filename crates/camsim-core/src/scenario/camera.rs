@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AutoExposureSpec, ChromaticSpec, Face, FieldOr, ImageCircleSpec, ImageSensorSpec, PointSpreadSpec,
-    Primary, TimingSpec, VignettingSpec,
+    AutoExposureSpec, ChromaticSpec, Face, FieldOr, FilesOfSpec, ImageCircleSpec, ImageSensorSpec,
+    PointSpreadSpec, Primary, ResizedSpec, TimingSpec, VignettingSpec,
 };
 use crate::{
     lens::LensTable,
@@ -76,10 +76,20 @@ pub struct CameraSpec {
     /// What of the picture the lens shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_circle: Option<ImageCircleSpec>,
+    /// Part and scale of the picture that the other keys describe, which the camera delivers. It is applied when a
+    /// file is read ([`Self::resized`]).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resized: Option<ResizedSpec>,
+    /// The picture that the files of `lens_table` and of the vignette are of, where it is not this camera's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub files_of: Option<FilesOfSpec>,
     /// The primary that this camera is for, where it is one of three ([`CameraSpec::of_primary`]); files have
     /// whole cameras.
     #[serde(skip)]
     pub primary: Option<Primary>,
+    /// Whether `resized` has made it of a part of a picture, so that its axis may be anywhere.
+    #[serde(skip)]
+    pub is_part: bool,
 }
 
 impl Default for CameraSpec {
@@ -106,7 +116,10 @@ impl Default for CameraSpec {
             point_spread: None,
             chromatic: None,
             image_circle: None,
+            resized: None,
+            files_of: None,
             primary: None,
+            is_part: false,
         }
     }
 }

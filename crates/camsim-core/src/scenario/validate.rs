@@ -15,6 +15,7 @@ mod motion;
 mod names;
 mod optics;
 mod point_spread;
+mod resized;
 mod rig;
 mod scene;
 mod sensors;
@@ -25,6 +26,7 @@ mod video;
 
 use lens::check_coefficients;
 
+pub use resized::{checked_camera, checked_cameras, checked_rig};
 pub use rig::{validate_cameras, validate_rig};
 
 /// Largest number of depth look-ups of `reproject`. The planner uses at most 8; a pixel that has not
@@ -257,6 +259,7 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     auto_exposure::check_auto_exposure(check, camera);
     point_spread::check_point_spread(check, camera);
     optics::check_optics(check, camera);
+    resized::check_resized(check, camera);
 }
 
 fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {

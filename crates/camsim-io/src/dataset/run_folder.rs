@@ -369,7 +369,7 @@ fn read_frames(path: &Path, nominal_ms: f64) -> Result<(Vec<String>, Vec<RunFram
     let header: Vec<String> = rows.header().iter().map(str::to_owned).collect();
     let place = |of: &str| header.iter().position(|name| name == of);
     let (instant, exposure) = (place("instant"), place("exposure_ms"));
-    let last = instant.or_else(|| place("gain")).or_else(|| place("ideal_qz")).unwrap_or(0);
+    let last = ["instant", "gain", "height_m", "ideal_qz"].into_iter().find_map(place).unwrap_or(0);
     let columns = header.get(last + 1..).unwrap_or_default().to_vec();
     let mut frames = Vec::new();
     while rows.advance()? {

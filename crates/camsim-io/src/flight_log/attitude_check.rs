@@ -64,7 +64,8 @@ fn upside_down(rows: &[LogRow], has_quaternions: bool) -> Option<String> {
 /// The order of the numbers of the quaternions in which nearly all are upright; `None` if there is none other
 /// than that in which they were read.
 fn better_order(attitudes: &[DQuat]) -> Option<&'static str> {
-    let orders: [(&str, fn(DQuat) -> DQuat); 2] = [
+    type Reorder = fn(DQuat) -> DQuat;
+    let orders: [(&str, Reorder); 2] = [
         // Read as x, y, z, w.
         ("w, x, y, z", |q| DQuat::from_xyzw(q.y, q.z, q.w, q.x)),
         // Read as w, x, y, z.

@@ -7,10 +7,21 @@ use camsim_core::{
 
 use crate::unlikely_camera;
 
+/// What to do where a size has been changed without the calibration.
+const RESIZE_ADVICE: &str = ". To make the pictures of a camera smaller or larger with its calibration, leave \
+    camera.size_px as it was calibrated, and set camera.resized.size_px, scale, binning or crop_px";
+
 /// Warns of values that are probably mistakes, and of keys that have no effect or clip the picture.
 pub(super) fn unlikely_values(camera: &CameraSpec) -> Vec<String> {
-    let doubts = unlikely_camera::doubts(camera).into_iter().map(|doubt| format!("camera.{doubt}"));
-    doubts.chain(noise_warning(camera)).chain(full_well_warning(camera)).chain(reset_warning(camera)).collect()
+    let doubts = unlikely_camera::doubts(camera).into_iter().map(|doubt| {
+        let advice = if doubt.key() == "principal_point_px" { RESIZE_ADVICE } else { "" };
+        format!("camera.{doubt}{advice}")
+    });
+    doubts
+        .chain(noise_warning(camera))
+        .chain(full_well_warning(camera))
+        .chain(reset_warning(camera))
+        .collect()
 }
 
 /// Noise of more than the range from black to white, as where 8-bit values were meant.
@@ -67,6 +78,29 @@ mod tests {
         let text = noise_warning(&camera(30.0)).unwrap_or_default();
         assert!(text.contains("noise_sigma = 30") && text.contains("makes 0.1176"), "{text}");
         assert_eq!(noise_warning(&camera(1.0)), None);
+    }
+
+    #[test]
+    fn a_size_that_the_principal_point_is_not_of_is_named_with_the_key_that_resizes() {
+        let camera =
+            |size_px, principal_point_px| CameraSpec { size_px, principal_point_px, ..CameraSpec::default() };
+        let text = |camera| unlikely_values(&camera).concat();
+        let demo = Some([318.3, 241.2]);
+        for (size_px, wanted) in [
+            (
+                [320, 240],
+                "camera.principal_point_px = [318.3, 241.2] would be the centre of a picture of about 638 x 483, \
+                 not of 320 x 240",
+            ),
+            ([1280, 960], "not of 1280 x 960"),
+            ([160, 120], "not of 160 x 120"),
+        ] {
+            let text = text(camera(size_px, demo));
+            assert!(text.contains(wanted) && text.contains("set camera.resized.size_px"), "{text}");
+        }
+        assert_eq!(text(camera([640, 480], demo)), "");
+        assert_eq!(text(camera([320, 240], None)), "");
+        assert_eq!(text(CameraSpec { is_part: true, ..camera([320, 240], demo) }), "");
     }
 
     #[test]

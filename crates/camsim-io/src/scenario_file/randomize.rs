@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
-use super::{ScenarioError, rig_of_tree, rig_table, tree::Tree};
+use super::{ScenarioError, rig_of_tree, rig_table, stated_rig, tree::Tree};
 
 mod draw;
 mod law;
@@ -35,7 +35,9 @@ pub struct RandomScenario {
     tree: Tree,
     /// The scenario without what is drawn.
     base: Rig,
-    /// The tree of `base`, with all defaults.
+    /// As `base`, before `camera.resized` is applied.
+    stated: Rig,
+    /// The tree of `stated`, with all defaults.
     defaults: Table,
     preset: Option<Preset>,
     /// Without one there are no variations.
@@ -143,17 +145,26 @@ impl RandomScenario {
             }
         }
         tree.check_cameras()?;
-        let base = rig_of_tree(tree.clone(), preset)?;
-        let defaults = rig_table(&base)
+        let base = rig_of_tree(&mut tree.clone(), preset)?;
+        // Values are drawn for the keys as the file states them, which camera.resized changes afterwards.
+        let stated = stated_rig(&mut tree.clone(), preset)?;
+        let defaults = rig_table(&stated)
             .map_err(|error| ScenarioError::Problems(vec![format!("{}: {error}", tree.file.display())]))?;
         let spec = written.as_ref().map(|written| written.spec(&tree, &defaults, base.first().seed, &fixed));
-        Ok(Self { spec: spec.transpose()?, written, tree, base, defaults, preset })
+        Ok(Self { spec: spec.transpose()?, written, tree, base, stated, defaults, preset })
     }
 
     /// The scenario without what is drawn.
     #[must_use]
     pub fn base(&self) -> &Rig {
         &self.base
+    }
+
+    /// As [`Self::base`], with `camera.resized` and the camera that it is applied to: what `[randomize]` draws are
+    /// values of that camera.
+    #[must_use]
+    pub fn stated(&self) -> &Rig {
+        &self.stated
     }
 
     /// As [`Self::base`].
@@ -204,7 +215,7 @@ impl RandomScenario {
         let mut drawn = Vec::new();
         let rig = self
             .draw_into(spec, index, &mut tree, &mut drawn)
-            .and_then(|()| rig_of_tree(tree, self.preset))
+            .and_then(|()| rig_of_tree(&mut tree, self.preset))
             .map_err(|source| of_variation(index, &drawn, source))?;
         Ok(Variation { index, rig, drawn, seed: spec.seed })
     }

@@ -1,6 +1,6 @@
 //! Scenarios of one camera or several as trees of values: `cameras` in place of `camera`.
 
-use camsim_core::scenario::{CameraSpec, Rig, Scenario, validate_cameras};
+use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, checked_cameras};
 use serde::{Serialize, de::Error as _};
 use serde_json::Value as Json;
 use toml::{Table, Value};
@@ -12,7 +12,7 @@ use super::{
     unexpected,
 };
 
-/// The scenarios of a tree with paths resolved. Ranges are not checked.
+/// The scenarios of a tree with paths resolved. Ranges are not checked, and `camera.resized` is not applied.
 ///
 /// # Errors
 /// Keys or types that do not fit.
@@ -74,14 +74,10 @@ pub(super) fn read_cameras_alone(mut tree: Tree) -> Result<Vec<CameraSpec>, Scen
     }
     let cameras = tree.root.get(CAMERAS).cloned().unwrap_or(Value::Array(Vec::new()));
     let cameras: Vec<CameraSpec> = cameras.try_into().map_err(|error| unexpected(&tree, &error))?;
-    let problems: Vec<String> = validate_cameras(&cameras)
-        .iter()
-        .map(|problem| format!("{}: {problem}", tree.location(&problem.key)))
-        .collect();
-    if !problems.is_empty() {
-        return Err(ScenarioError::Problems(problems));
-    }
-    Ok(cameras)
+    checked_cameras(cameras).map_err(|problems| {
+        let line = |problem: &Problem| format!("{}: {problem}", tree.location(&problem.key));
+        ScenarioError::Problems(problems.iter().map(line).collect())
+    })
 }
 
 #[cfg(test)]

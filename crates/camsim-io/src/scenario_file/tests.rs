@@ -3,11 +3,12 @@
 use camsim_core::imaging::KernelFile;
 use camsim_core::lens::LensTable;
 use camsim_core::scenario::{
-    Auto, AutoExposureSpec, BarometerSpec, Beyond, BoardKind, BoardSpec, BurstOver, CameraSpec, Channel,
-    ChromaticSpec, Dictionary, FieldOr, FlowInstant, GnssSpec, HeightUnit, ImageCircleSpec, ImageSensorSpec,
-    ImuSpec, LensModel, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf, OutputSpec, PerChannel,
-    PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, Reset, SensorModel, SpinSpec, StampedBy,
-    TimingSpec, TrackerSpec, TwinShutter, TwinSpec, VignettingSpec,
+    Auto, AutoExposureSpec, BarometerSpec, Beyond, Binning, BoardKind, BoardSpec, BurstOver, CameraSpec,
+    Channel, ChromaticSpec, Dictionary, FieldOr, FilesOfSpec, FlowInstant, GnssSpec, HeightUnit,
+    ImageCircleSpec, ImageSensorSpec, ImuSpec, LensModel, LoopKind, MagnetometerSpec, MotionSpec, ObjectsOf,
+    OutputSpec, PerChannel, PointSpreadSpec, PrimaryLensSpec, QualitySpec, Readout, Reset, ResizedSpec,
+    SensorModel, SpinSpec, StampedBy, TimingSpec, TrackerSpec, TrajectorySpan, TwinShutter, TwinSpec,
+    VignettingSpec,
 };
 
 use super::{schema::KEYS, *};
@@ -164,6 +165,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
         ..board(1, 1, 1.0)
     });
     scenario.output.palette = true;
+    scenario.output.trajectory = TrajectorySpan::Flight;
     scenario.output.video.bits = 10;
     if let Some(light) = &mut scenario.scene.light {
         light.shadows = true;
@@ -233,6 +235,18 @@ fn full_optics(camera: &mut CameraSpec) {
         Some(ChromaticSpec { red_scale: scale(), blue_scale: scale(), red: lens.clone(), blue: lens });
     camera.image_circle =
         Some(ImageCircleSpec { radius_px: Some(1.0), centre_px: Some([1.0; 2]), half_angle_deg: Some(1.0) });
+    camera.resized = Some(ResizedSpec {
+        crop_px: Some([0, 0, 4, 4]),
+        binning: Some(Binning::Both(2.0)),
+        scale: Some(0.5),
+        size_px: Some([2, 2]),
+    });
+    camera.files_of = Some(FilesOfSpec {
+        size_px: [4; 2],
+        focal_px: [1.0; 2],
+        principal_point_px: [1.0; 2],
+        part_px: [0.0, 0.0, 2.0, 2.0],
+    });
     camera.photometric.vignetting = Some(VignettingSpec {
         cos_power: 4.0,
         polynomial: scale(),

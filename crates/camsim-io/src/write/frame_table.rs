@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::{exposure::FrameExposure, pose::CameraPose};
+use camsim_core::{exposure::FrameExposure, geodesy::Geodetic, pose::CameraPose};
 use camsim_plan::FramePlan;
 
 use super::{
@@ -22,7 +22,11 @@ pub const FRAMES_COLUMNS: &str = "\
                                   ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,\
                                   ideal_qw,ideal_qx,ideal_qy,ideal_qz";
 
-/// Columns after these in the table of a camera with automatic exposure.
+/// Columns after these in the table of a flight on Earth: the camera's place at the stamp, in the vertical datum of
+/// the scenario.
+const PLACE_COLUMNS: &str = ",lat_deg,lon_deg,height_m";
+
+/// Columns after those in the table of a camera with automatic exposure.
 const EXPOSURE_COLUMNS: &str = ",exposure_ms,gain";
 
 /// Column after those in the table of a burst.
@@ -39,6 +43,8 @@ pub struct FrameRecord {
     pub stamp_ns: i64,
     /// Pose of the camera at the stamp.
     pub pose: CameraPose,
+    /// The same place on Earth, where the flight has an origin there. One table has one kind only.
+    pub place: Option<Geodetic>,
     /// Camera of the source coordinates.
     pub source: SourceFrame,
     /// Exposure, where it follows the pictures. One table has one kind only.
@@ -90,6 +96,8 @@ pub struct FrameTable {
 /// Columns that not every table has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TableKind {
+    /// Whether the flight is on Earth.
+    pub has_places: bool,
     /// Whether exposures follow the pictures.
     pub has_exposures: bool,
     /// Whether it is of a burst.
@@ -99,21 +107,23 @@ pub struct TableKind {
 impl TableKind {
     /// The columns of values.
     fn columns(self) -> String {
+        let places = if self.has_places { PLACE_COLUMNS } else { "" };
         let exposures = if self.has_exposures { EXPOSURE_COLUMNS } else { "" };
         let instants = if self.has_instants { INSTANT_COLUMN } else { "" };
-        format!("{FRAMES_COLUMNS}{exposures}{instants}")
+        format!("{FRAMES_COLUMNS}{places}{exposures}{instants}")
     }
 
     /// The kind of a header, and the columns of files with a comma before each.
     fn of_header(header: &str) -> Option<(Self, &str)> {
         let mut rest = header.strip_prefix(FRAMES_COLUMNS)?;
-        let [has_exposures, has_instants] = [EXPOSURE_COLUMNS, INSTANT_COLUMN].map(|columns| {
+        let optional = [PLACE_COLUMNS, EXPOSURE_COLUMNS, INSTANT_COLUMN];
+        let [has_places, has_exposures, has_instants] = optional.map(|columns| {
             let after = rest.strip_prefix(columns);
             let after = after.filter(|after| after.is_empty() || after.starts_with(','));
             rest = after.unwrap_or(rest);
             after.is_some()
         });
-        Some((Self { has_exposures, has_instants }, rest))
+        Some((Self { has_places, has_exposures, has_instants }, rest))
     }
 }
 
@@ -173,6 +183,9 @@ impl FrameTable {
         values += &format!(",{}", source.t_ns);
         push(&mut values, &source.pose.position_ned_m.to_array());
         push(&mut values, &wxyz(source.pose.ned_from_camera));
+        if let Some(place) = record.place {
+            push(&mut values, &[place.lat_deg(), place.lon_deg(), place.height_m]);
+        }
         if let Some(exposure) = record.exposure {
             push(&mut values, &[1e3 * exposure.time_s, exposure.gain]);
         }
@@ -262,6 +275,13 @@ pub fn frames_path(folder: &Path) -> PathBuf {
     folder.join("frames.csv")
 }
 
+/// The first and the last frame that the table of a folder lists; `None` without any.
+#[must_use]
+pub fn listed_frames(folder: &Path) -> Option<[u64; 2]> {
+    let table = FrameTable::parse(&std::fs::read_to_string(frames_path(folder)).ok()?)?;
+    Some([table.frames().next()?, table.frames().last()?])
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
@@ -282,7 +302,7 @@ mod tests {
         };
         let files =
             columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
-        FrameRecord { frame, instant: None, stamp_ns: 9, pose, source, exposure: None, files }
+        FrameRecord { frame, instant: None, stamp_ns: 9, pose, place: None, source, exposure: None, files }
     }
 
     #[test]
@@ -337,6 +357,8 @@ mod tests {
                 && lines[2].ends_with(",depth/3")
         );
         assert!(table.contains(3) && !table.contains(0));
+        table.write(&path).unwrap();
+        assert_eq!((listed_frames(folder.path()), listed_frames(Path::new("/no"))), (Some([1, 3]), None));
     }
 
     #[test]
@@ -371,9 +393,22 @@ mod tests {
     }
 
     #[test]
-    fn exposures_have_columns_before_the_files() {
+    fn places_and_exposures_have_columns_before_the_files() {
+        let kind = TableKind { has_places: true, ..TableKind::default() };
+        let mut table = FrameTable::new(kind);
+        let place = Some(Geodetic::from_deg(47.5, -8.25, 430.0));
+        table.insert(&FrameRecord { place, ..record(4, &["color_png"]) });
+        let text = table.to_csv();
+        let (header, row) = text.trim_end().split_once('\n').unwrap();
+        assert!(header.ends_with(",ideal_qz,lat_deg,lon_deg,height_m,color_png"), "{header}");
+        let place: Vec<f64> = row.split(',').skip(23).take(3).map(|value| value.parse().unwrap()).collect();
+        assert!(
+            (place[0] - 47.5).abs() < 1e-12 && (place[1] + 8.25).abs() < 1e-12 && place[2] == 430.0,
+            "{row}"
+        );
+        assert_eq!(FrameTable::parse(&text).unwrap(), table);
         for has_instants in [false, true] {
-            let kind = TableKind { has_exposures: true, has_instants };
+            let kind = TableKind { has_exposures: true, has_instants, ..TableKind::default() };
             let mut table = FrameTable::new(kind);
             let exposure = Some(FrameExposure { time_s: 2.5e-3, gain: 1.5, light: 9.0 });
             let instant = has_instants.then_some(7);

@@ -4,7 +4,7 @@ use camsim_core::{mount::CameraPath, shutter::Shutter, temporal::IdealGeometry};
 use glam::DVec2;
 
 use super::{lens_reach::LensReach, surfaces::Surfaces};
-use crate::ir::motion::Motion;
+use crate::ir::motion::{Departure, Motion};
 
 /// Instants for each period of the fastest vibration.
 const INSTANTS_PER_PERIOD: f64 = 8.0;
@@ -39,23 +39,34 @@ pub(crate) fn measure(
     let (first, last) = shutter.window_s();
     let window_s = [stamp_s + first, stamp_s + last];
     let travel_m = travel_m(path, window_s, key_s);
-    let rotation_rad = instants(path, window_s)
-        .map(|t| path.pose(t).ned_from_camera.angle_between(key.ned_from_camera))
-        .fold(0.0, f64::max);
     let nearest_m = surfaces.nearest_m(&key, ideal.tangents(), travel_m);
     let slant = reach.slant();
     let focal_px = ideal.focal_px.max_element();
+    let departure = |from_s: f64| {
+        let from = path.pose(from_s);
+        let travel_m = self::travel_m(path, window_s, from_s);
+        let rotation_rad = instants(path, window_s)
+            .map(|t| path.pose(t).ned_from_camera.angle_between(from.ned_from_camera))
+            .fold(0.0, f64::max);
+        // d(h)/d(t): at most f |t| w sqrt(1 + r^2) for a unit w; rotation moves a ray by at most f theta (1 + r^2).
+        Departure {
+            travel_m,
+            rotation_rad,
+            parallax_px: focal_px * travel_m / nearest_m * slant,
+            rotation_px: focal_px * rotation_rad * slant * slant,
+        }
+    };
+    let Departure { rotation_rad, parallax_px, rotation_px, .. } = departure(key_s);
     let (blur_px, blur_sagitta_px) = blur_path(reach, path, shutter, stamp_s, ideal, 1.0 / nearest_m);
     Motion {
         nearest_m,
         travel_m,
         rotation_rad,
-        // d(h)/d(t): at most f |t| w sqrt(1 + r^2) for a unit w; rotation moves a ray by at most f theta (1 +
-        // r^2).
-        parallax_px: focal_px * travel_m / nearest_m * slant,
-        rotation_px: focal_px * rotation_rad * slant * slant,
+        parallax_px,
+        rotation_px,
         blur_px,
         blur_sagitta_px,
+        own: departure(window_s[0]),
     }
 }
 

@@ -204,6 +204,7 @@ fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
             instant: None,
             stamp_ns,
             pose,
+            place: None,
             source,
             exposure: None,
             files,

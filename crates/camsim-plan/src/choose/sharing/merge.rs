@@ -19,7 +19,9 @@ pub(crate) fn merged(mut plans: Vec<FramePlan>) -> Vec<FramePlan> {
         plan.predicted.terrain =
             plan.predicted.terrain.map(|terrain| terrain.times(terrain_error_px / plan.terrain_error_px));
         plan.terrain_error_px = terrain_error_px;
-        plan.motion = motion;
+        // What does not depend on the ideal frame stays that of the frame.
+        let Motion { own, blur_px, blur_sagitta_px, .. } = plan.motion;
+        plan.motion = Motion { own, blur_px, blur_sagitta_px, ..motion };
         plan.skipped.push(Skip {
             what: "ideal frame of its own",
             reason: format!("frames {first} to {last} are made from one"),
