@@ -245,7 +245,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
     let (is_geodetic, reads_attitude) =
         (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
-    stamp_resolution::spread_equal_stamps(&mut rows.rows, &mut notes).map_err(problem)?;
+    stamp_resolution::spread_equal_stamps(&mut rows.rows, &mut notes);
     held_positions::interpolate_held(&mut rows.rows, is_geodetic, &mut notes);
     sparse_rows::interpolate_positions(&mut rows.rows, is_geodetic, reads_attitude, &mut notes);
     if table.has_decimal_commas {

@@ -657,8 +657,9 @@ fn all_equal_times_are_refused_and_one_place_is_not() {
     );
     let still = text(point(47.05) + &point(47.05));
     assert_eq!(read_text("a.gpx", &still, &path()).unwrap().rows.len(), 1);
-    // Some equal times may be those of a log in whole seconds, but the places are named.
-    let some = "t_s,lat_deg,lon_deg,alt_m\n5,47.05,8.31,480\n5,47.06,8.31,480\n6,47.07,8.31,480\n";
+    // Two rows of one time among others are averaged, but the distance is named.
+    let some = "t_s,lat_deg,lon_deg,alt_m\n5,47.05,8.31,480\n5,47.06,8.31,480\n6,47.07,8.31,480\n7,47.07,8.31,480\n\
+        8,47.07,8.31,480\n";
     let report = read_text("a.csv", some, &path()).unwrap().report;
     assert!(report.to_string().contains("averaged rows are up to 1111.8 m apart"), "{report}");
     // The same of a table.

@@ -96,7 +96,10 @@ fn every_format_gives_the_circle() {
         case("px4_global.ulg", topic("vehicle_gps_position, vehicle_attitude"), 401, [0.032, 0.002, 0.02]),
         // Hundredths of a degree; heights in f32.
         case("ardupilot.bin", spec(), 401, [0.017, 0.002, 0.02]),
-        case("ardupilot.bin", topic("XKF1"), 201, [0.002, 0.002, 0.02]),
+        Case {
+            warnings: &["`XKF1` has the instances 0, 1"],
+            ..case("ardupilot.bin", topic("XKF1"), 201, [0.002, 0.002, 0.02])
+        },
         // The third fix of GPS is the first with three dimensions, 0.6 s after the first attitude.
         Case {
             seconds: 19.4,

@@ -56,16 +56,7 @@ impl<'a> HeaderLines<'a> {
         let Some((index, header)) = complete else { return Self::without_names(path, table, spec, notes) };
         let names_line = table.headers[index];
         if !table.fits(header.0.len()) {
-            // RTKLIB's names of such columns.
-            let problem = match names_line.text.contains("latitude(d'\")") {
-                true => {
-                    "degrees, minutes and seconds stand in columns of their own: write degrees with decimals \
-                    (RTKLIB: Lat/Lon format ddd.ddddddd)"
-                        .to_owned()
-                }
-                false => width_message(header.0.len(), table),
-            };
-            return fail(names_line.number, problem);
+            return fail(names_line.number, width_message(&table.names(names_line.text), table));
         }
         let mut header = header;
         let mut prose = Vec::new();
@@ -126,10 +117,17 @@ fn known_names(header: &HeaderColumns) -> usize {
 }
 
 /// Message for names of another number than the columns.
-pub(super) fn width_message(names: usize, table: &Table<'_>) -> String {
+pub(super) fn width_message(names: &[&str], table: &Table<'_>) -> String {
+    // RTKLIB's name of such columns.
+    if names.contains(&"latitude(d'\")") {
+        return "degrees, minutes and seconds stand in columns of their own: write degrees with decimals (RTKLIB: \
+                Lat/Lon format ddd.ddddddd)"
+            .to_owned();
+    }
     format!(
-        "it names {names} columns, but the rows have {}: give every column one name (a comma within a name \
-            needs quotes, decimal commas need semicolons between the columns)",
+        "it names {} columns, but the rows have {}: give every column one name (a comma within a name needs \
+            quotes, decimal commas need semicolons between the columns)",
+        names.len(),
         table.columns
     )
 }

@@ -8,7 +8,7 @@ use super::{
     columns::Frame,
     header::HeaderColumns,
     streams,
-    text_table::{Table, is_missing},
+    text_table::{HeaderLine, Table, is_missing},
     units::{Qualifier, VerticalDatum, parse_qualifier},
 };
 
@@ -31,7 +31,8 @@ pub(super) fn check(
     for column in words.into_iter().chain([height]) {
         check_words(header, table, (column, height), spec, notes);
     }
-    if let Some((line, datum)) = of_comments(table) {
+    if let Some((line, datum)) = table.headers.iter().find_map(|line| Some((line.number, of_comment(line)?)))
+    {
         notes.extend(stated_note(&format!("line {line}"), datum, spec));
     }
 }
@@ -117,16 +118,12 @@ fn check_words(
     }
 }
 
-/// The datum in the comment that RTKLIB writes about its solution, with its line.
-fn of_comments(table: &Table<'_>) -> Option<(usize, VerticalDatum)> {
-    table.headers.iter().find_map(|line| {
-        let (_, after) = line.text.split_once("lat/lon/height=")?;
-        let word = after.split_once('/')?.1.split(|c: char| !c.is_alphanumeric()).next()?;
-        let datum = match word {
-            "ellipsoidal" => VerticalDatum::Ellipsoid,
-            "geodetic" => VerticalDatum::MeanSeaLevel,
-            _ => return None,
-        };
-        Some((line.number, datum))
-    })
+/// The datum in the comment that RTKLIB writes about its solution.
+pub(super) fn of_comment(line: &HeaderLine<'_>) -> Option<VerticalDatum> {
+    let (_, after) = line.text.split_once("lat/lon/height=")?;
+    match after.split_once('/')?.1.split(|c: char| !c.is_alphanumeric()).next()? {
+        "ellipsoidal" => Some(VerticalDatum::Ellipsoid),
+        "geodetic" => Some(VerticalDatum::MeanSeaLevel),
+        _ => None,
+    }
 }

@@ -49,7 +49,7 @@ impl TableLayout {
         notes: &mut Vec<Note>,
     ) -> Result<Self, FlightLogError> {
         detect::refuse_pose_matrices(path, table)?;
-        let header_lines = HeaderLines::sort(path, table, spec, notes)?;
+        let mut header_lines = HeaderLines::sort(path, table, spec, notes)?;
         let mut layout = match (&header_lines.names, &header_lines.misfit) {
             (Some((line, header)), _) => Self::from_header(header, table, spec, notes)
                 .map_err(|problem| FlightLogError::Header { path: path.to_owned(), line: *line, problem })?,
@@ -58,6 +58,8 @@ impl TableLayout {
                 Self::without_names(path, table, spec, misfit, notes)?
             }
         };
+        // The comment that is read in full.
+        header_lines.prose.retain(|line| height_datum::of_comment(line).is_none());
         statements::apply(&mut layout, table, &header_lines.prose, spec, notes);
         Ok(layout)
     }
@@ -97,7 +99,7 @@ impl TableLayout {
             _ => Err(FlightLogError::Header {
                 path: path.to_owned(),
                 line,
-                problem: width_message(names.len(), table),
+                problem: width_message(names, table),
             }),
         }
     }

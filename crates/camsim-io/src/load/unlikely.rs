@@ -8,8 +8,8 @@ use camsim_core::{
 use crate::unlikely_camera;
 
 /// What to do where a size has been changed without the calibration.
-const RESIZE_ADVICE: &str = ". To make the pictures of a camera smaller or larger with its calibration, leave \
-    camera.size_px as it was calibrated, and set camera.resized.size_px, scale, binning or crop_px";
+const RESIZE_ADVICE: &str = " (to make the pictures of a camera smaller or larger with its calibration, leave \
+    camera.size_px as it was calibrated, and set camera.resized.size_px, scale, binning or crop_px)";
 
 /// Warns of values that are probably mistakes, and of keys that have no effect or clip the picture.
 pub(super) fn unlikely_values(camera: &CameraSpec) -> Vec<String> {

@@ -19,7 +19,9 @@ pub(super) fn doubt(camera: &CameraSpec) -> Option<Doubt> {
     let size = camera.size_px.map(f64::from);
     // Zero and one are the borders.
     let shares = [0, 1].map(|axis| (point[axis] + 0.5) / size[axis]);
-    let problem = if shares.iter().all(|share| share.abs() < CORNER || (share - 1.0).abs() < CORNER) {
+    let is_corner = shares.iter().all(|share| share.abs() < CORNER || (share - 1.0).abs() < CORNER);
+    // The last corner would be the centre of a picture of twice the size.
+    let problem = if is_corner && shares.iter().any(|share| share.abs() < CORNER) {
         format!(
             "is in the corner of the picture of {}: is it missing, or counted from the centre?",
             times(size)
