@@ -379,7 +379,7 @@ pub enum TrackerKind {
     /// Two nested SQRT loops per channel (paper section 3).
     #[default]
     Sqrt,
-    /// Quadratic B-spline fitted to the whole log under the limits.
+    /// Cubic B-spline fitted to the whole log under the limits.
     Spline,
 }
 
