@@ -286,7 +286,8 @@ impl Resizing {
     }
 
     /// Rows keep the time from one to the next, so that a part of them is read in that part of the time.
-    /// `delay_ms` is that of the delivered picture's centre.
+    /// `delay_ms` is that of the delivered picture's centre; of halves the middle rows have it, which are later or
+    /// earlier than the centre where they are the means of several rows.
     fn shutter(&self, camera: &CameraSpec) -> ShutterSpec {
         let mut shutter = camera.shutter.clone();
         let axis = match shutter.readout {
@@ -294,6 +295,13 @@ impl Resizing {
             _ => 1,
         };
         let share = f64::from(self.part_px[2 + axis]) / f64::from(camera.size_px[axis]);
+        let row_ms = camera.readout_ms() / f64::from(camera.size_px[axis]);
+        let later_ms = (1.0 / self.scale[axis] - 1.0) * row_ms;
+        match shutter.readout {
+            Readout::MiddleOutward => shutter.delay_ms -= later_ms,
+            Readout::EdgesInward => shutter.delay_ms += later_ms,
+            _ => {}
+        }
         shutter.readout_ms *= share;
         if let Some(line_us) = &mut shutter.line_time_us {
             *line_us /= self.scale[axis];
