@@ -112,7 +112,8 @@ def poses(folder, check):
     check("EuRoC: T_BS", np.abs(np.array(sensor["T_BS"]["data"]).reshape(4, 4) - wanted).max(), 1e-14)
     orb = cv2.FileStorage(str(folder / "radtan.orbslam3"), cv2.FILE_STORAGE_READ)
     # ORB-SLAM3 keeps the pose in floats.
-    check("ORB-SLAM3: IMU.T_b_c1", np.abs(orb.getNode("IMU.T_b_c1").mat() - wanted).max(), 1e-14)
+    # ORB-SLAM3 reads 32-bit numbers.
+    check("ORB-SLAM3: IMU.T_b_c1", np.abs(orb.getNode("IMU.T_b_c1").mat() - wanted).max(), 1e-6)
     check("ORB-SLAM3: Camera1.fx", abs(orb.getNode("Camera1.fx").real() - FOCAL[0]), 0)
     t = json.loads((folder / "radtan.basalt").read_text())["value0"]["T_imu_cam"][0]
     check("Basalt: T_imu_cam", np.abs(np.array([t["px"], t["py"], t["pz"]]) - wanted[:3, 3]).max(), 1e-15)

@@ -44,8 +44,8 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param:
         ValueKind::Whole | ValueKind::Within(..) => number(ui, key, value, param, true, out),
         ValueKind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
         ValueKind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
-        ValueKind::Numbers(count) => optional_numbers(ui, key, value, document, param, count, out),
-        ValueKind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
+        ValueKind::Numbers(count) => optional_numbers(ui, document, key, value, param, count, false, out),
+        ValueKind::Counts(count, _) => optional_numbers(ui, document, key, value, param, count, true, out),
         ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
         // Numbers of frames, which are whole.
         ValueKind::NumberList if key.starts_with("camera.timing.") => as_written(ui, key, value, param),
@@ -211,16 +211,18 @@ fn numbers(
 /// Numbers that may be absent.
 fn optional_numbers(
     ui: &mut Ui,
+    document: &Document,
     key: &str,
     value: Option<&Value>,
-    document: &Document,
     param: &Param,
     count: usize,
+    whole: bool,
     out: &mut Outbox,
 ) -> Option<Edit> {
-    let may_be_left_out = matches!(key.rsplit('.').next(), Some("window_s" | "principal_point_px"));
+    let may_be_left_out = matches!(key.rsplit('.').next(), Some("window_s" | "principal_point_px"))
+        || key.starts_with("camera.resized.");
     if value.is_some() {
-        let edit = numbers(ui, document, key, value, param, count, false, out);
+        let edit = numbers(ui, document, key, value, param, count, whole, out);
         return if may_be_left_out && remove(ui, key) {
             Some(Edit { value: None, is_dragged: false })
         } else {
@@ -233,9 +235,12 @@ fn optional_numbers(
     let start = match key.rsplit('.').next() {
         Some("principal_point_px") => camera.size_px.map(|side| 0.5 * (f64::from(side) - 1.0)).to_vec(),
         Some("window_s") => vec![0.0, 10.0],
+        Some("size_px") => camera.size_px.map(f64::from).to_vec(),
+        Some("crop_px") => [[0, 0], camera.size_px].as_flattened().iter().map(|&px| f64::from(px)).collect(),
         _ => vec![0.0; count],
     };
-    add.clicked().then(|| Value::Array(start.into_iter().map(Value::Float).collect())).and_then(single_edit)
+    let start = || start.iter().map(|&number| to_value(number, whole)).collect();
+    add.clicked().then(|| Value::Array(start())).and_then(single_edit)
 }
 
 /// Numbers, or the given word.

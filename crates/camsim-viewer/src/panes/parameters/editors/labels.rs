@@ -11,6 +11,7 @@ pub fn element_labels(key: &str, lens: LensModel) -> &'static [&'static str] {
     match (leaf, lens) {
         ("coefficients", lens) => lens.facts().coefficients,
         ("size_px", _) => &["W", "H"],
+        ("crop_px" | "part_px", _) => &["left", "top", "width", "height"],
         ("focal_px", _) => &["fx", "fy"],
         ("principal_point_px", _) => &["cx", "cy"],
         ("angles_deg", _) => ANGLES,
