@@ -296,3 +296,38 @@ channels = ["color"]
     assert!(code == 0 && !path("out/global/objects.csv").exists(), "{err}");
     assert!(table("out") == whole["tracks.csv"]);
 }
+
+#[test]
+fn a_lens_that_a_dataset_lacks_is_refused_before_rendering_and_its_twin_is_exported() {
+    let base = tempfile::tempdir().unwrap();
+    let path = scenario(base.path(), "[[output.twin]]\nname = \"plain\"\nlens = false\n");
+    let folder = base.path().join("out");
+    let panorama = [
+        "--set",
+        "camera.lens.model=\"equirectangular\"",
+        "--set",
+        "camera.lens.coefficients=[]",
+        "--set",
+        "output.format=[\"png\"]",
+    ];
+    for dataset in ["nerfstudio", "euroc", "tum", "colmap", "kalibr", "mcap"] {
+        let datasets = format!("output.datasets=[\"{dataset}\"]");
+        let (code, _, err) = render(&path, &folder, &[&panorama[..], &["--set", &datasets]].concat());
+        assert!(code != 0 && err.contains("has no lens of the model equirectangular"), "{dataset}: {err}");
+        assert!(err.contains("`camsim export OUT/plain --as ...`"), "{err}");
+        assert!(!folder.exists(), "{dataset}");
+    }
+    // As the error says.
+    let (code, _, err) = render(&path, &folder, &panorama);
+    assert_eq!(code, 0, "{err}");
+    let [plain, camera, dataset, json] =
+        ["out/plain", "out/plain/camera.toml", "nerfstudio", "plain.json"].map(|name| base.path().join(name));
+    for args in [
+        ["export", plain.to_str().unwrap(), "-o", dataset.to_str().unwrap()].as_slice(),
+        &["camera", "export", camera.to_str().unwrap(), "-o", json.to_str().unwrap()],
+    ] {
+        let (code, _, err) = camsim(&[args, &["--as", "nerfstudio"]].concat());
+        assert_eq!(code, 0, "{err}");
+    }
+    assert!(dataset.join("transforms.json").is_file() && json.is_file());
+}

@@ -48,7 +48,7 @@ pub use image_sensor::{
 pub use motion::{LoopKind, MotionSpec, SpinSpec};
 pub use optics::{ChromaticSpec, ImageCircleSpec, Primary, PrimaryLensSpec, VignettingSpec};
 pub use point_spread::PointSpreadSpec;
-pub use resized::{Binning, FilesOfSpec, ResizedSpec, Resizing};
+pub use resized::{Binning, FilesOfSpec, MadeOf, ResizedSpec, Resizing};
 pub use rig::Rig;
 pub use scene::{
     Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, ObjectsOf,

@@ -1,12 +1,17 @@
 //! Values of a camera that are legal and probably mistakes: the judge of calibrations of all formats, of rigs and
 //! of scenarios.
 
-use std::{f64::consts::TAU, fmt};
+use std::{
+    f64::consts::{FRAC_PI_4, TAU},
+    fmt,
+};
 
 use camsim_core::{
     camera::CameraModel,
     scenario::{CameraSpec, LensModel},
 };
+
+use crate::wording::rounded;
 
 mod lens;
 mod principal_point;
@@ -22,6 +27,12 @@ const SHORTEST_FOCAL: f64 = 0.02;
 const USUAL_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Longest usual lever arm, metres. In millimetres those of small devices exceed it.
 const LONGEST_ARM_M: f64 = 10.0;
+/// Angles of at most a quarter turn in radians, which are tiny in degrees.
+const MOST_RADIANS: f64 = 1.6;
+/// Rounding of round angles in radians.
+const ROUNDED_RAD: f64 = 1e-3;
+/// Fastest usual frame rate.
+const FASTEST_FPS: f64 = 1e4;
 /// Shortest readout of a rolling shutter, milliseconds; sensors need 1 ms or more.
 const SHORTEST_READOUT_MS: f64 = 0.1;
 /// Longest readout of a rolling shutter, milliseconds.
@@ -75,23 +86,35 @@ impl fmt::Display for Doubt {
 /// What is odd about a camera of a scenario.
 pub(crate) fn doubts(camera: &CameraSpec) -> Vec<Doubt> {
     let mut all = Vec::new();
+    let mut is_of_other_picture = false;
     if camera.zoom.is_empty() {
-        all.extend(field_doubt(camera));
-        all.extend(ratio_doubt(camera));
         // A part of a picture may have its axis anywhere.
-        all.extend((!camera.is_part).then(|| principal_point::doubt(camera)).flatten());
+        let is_whole = !camera.made_of.is_part;
+        let other = field_doubt(camera)
+            .into_iter()
+            .chain(is_whole.then(|| principal_point::doubt_of_other_picture(camera)).flatten());
+        all.extend(other);
+        is_of_other_picture = !all.is_empty();
+        all.extend(ratio_doubt(camera));
+        all.extend((is_whole && !is_of_other_picture).then(|| principal_point::far_doubt(camera)).flatten());
     }
-    all.extend(lens::doubts(camera));
+    // With the focal length or the size of another picture the lens is seen where it is not of this camera.
+    if !is_of_other_picture {
+        all.extend(lens::doubts_of_rays(camera));
+    }
+    all.extend(lens::tangential_doubt(camera));
     all.extend(arm_doubt(camera));
+    all.extend(angles_doubt(camera));
     all.extend(short_readout_doubt(camera));
     all
 }
 
-/// What is odd about a camera of a calibration. A scenario may shift a clock on purpose.
+/// What is odd about a camera of a calibration. A scenario may shift a clock on purpose, or film in slow motion.
 pub(crate) fn doubts_of_calibration(camera: &CameraSpec) -> Vec<Doubt> {
     let mut all = doubts(camera);
     all.extend(clock_doubt(camera));
     all.extend(long_readout_doubt(camera));
+    all.extend(rate_doubt(camera));
     all
 }
 
@@ -139,7 +162,8 @@ fn field_doubt(camera: &CameraSpec) -> Option<Doubt> {
 }
 
 fn ratio_doubt(camera: &CameraSpec) -> Option<Doubt> {
-    let [fx, fy] = camera.focal_px;
+    // Pixels that `resized` has made of unequal numbers are not square.
+    let [fx, fy] = [camera.focal_px[0] / camera.made_of.squeeze, camera.focal_px[1]];
     (!USUAL_RATIO.contains(&(fx / fy))).then(|| {
         let percent = 100.0 * (fx.max(fy) / fx.min(fy) - 1.0);
         let problem = format!(
@@ -157,6 +181,33 @@ fn arm_doubt(camera: &CameraSpec) -> Option<Doubt> {
         let problem =
             format!("puts the camera {length_m:.0} m from the body's origin: is it in millimetres?");
         Doubt::of("mount.offset_m", offset_m, problem)
+    })
+}
+
+/// Angles in radians: all are small, and one is an eighth of a turn or a multiple of it.
+fn angles_doubt(camera: &CameraSpec) -> Option<Doubt> {
+    let angles = camera.mount.angles_deg;
+    let is_round = |angle: f64| {
+        let eighths = angle.abs() / FRAC_PI_4;
+        eighths.round() >= 1.0 && (eighths - eighths.round()).abs() * FRAC_PI_4 < ROUNDED_RAD
+    };
+    let is_small = angles.iter().all(|angle| angle.abs() < MOST_RADIANS);
+    (is_small && angles.iter().any(|angle| is_round(*angle))).then(|| {
+        let degrees: Vec<String> = angles.iter().map(|angle| rounded(angle.to_degrees())).collect();
+        let problem = format!(
+            "is in degrees, and these are round angles in radians: were [{}] meant?",
+            degrees.join(", ")
+        );
+        Doubt::of("mount.angles_deg", angles, problem)
+    })
+}
+
+/// A period in nanoseconds, or a rate in another unit.
+fn rate_doubt(camera: &CameraSpec) -> Option<Doubt> {
+    (camera.fps > FASTEST_FPS).then(|| {
+        let problem =
+            format!("is more than any usual camera takes in a second, up to {FASTEST_FPS}: check its unit");
+        Doubt::of("fps", camera.fps, problem)
     })
 }
 

@@ -307,6 +307,17 @@ fn implausible_cameras_are_told_or_refused_in_all_formats() {
     const COLMAP: &str = "18-colmap-principal-at-corner/C19a_cameras.txt";
     const ROS: &str = "19-coefficients-in-thousands/C05d_huge.yaml";
     const ORB: &str = "20-orb-size-mismatch/E1.yaml";
+    const PAIR: &[(&str, &str)] = &[
+        ("1920", "752"),
+        ("1080", "480"),
+        (
+            "ThDepth: 40.0",
+            "Camera2.fx: 457.6\nCamera2.fy: 456.1\nCamera2.cx: 380.0\nCamera2.cy: 255.2\nStereo.b: 0.5\n\
+             Stereo.T_c1_c2: !!opencv-matrix\n  rows: 4\n  cols: 4\n  dt: f\n  \
+             data: [1.0, 0.0, 0.0, 0.1100738, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]",
+        ),
+    ];
+    const PAIR_WITH_BF: &[(&str, &str)] = &[PAIR[0], PAIR[1], PAIR[2], ("Stereo.b: 0.5", "Camera.bf: 50.4")];
     const CHAIN: &str = "21-clock-offset-seconds/E10.yaml";
     const LIST: &str = "1204.5, -310.2, 95.1, 1210.0, -305.1";
     let quiet = || Told(&[], DOUBTS);
@@ -324,7 +335,7 @@ fn implausible_cameras_are_told_or_refused_in_all_formats() {
             SFM,
             &[("2880.0", "0.72"), ("\"c_x\":0,\"c_y\":0", "\"c_x\":0.5,\"c_y\":0.375")],
             Only,
-            Told(&["is in the corner of the picture of 4000 x 3000"], &[]),
+            Told(&["would be the centre of a picture of about 8000 x 6000, not of 4000 x 3000"], &[]),
         ),
         (COLMAP, &[], Named("1"), Told(&["is in the corner", "differs by 69 %", "tangential terms"], &[])),
         (COLMAP, &[], Named("3"), quiet()),
@@ -356,6 +367,16 @@ fn implausible_cameras_are_told_or_refused_in_all_formats() {
         (ORB, &[("1920", "752"), ("1080", "480")], Only, quiet()),
         (ORB, &[("1920", "480"), ("1080", "752")], Only, Told(&["check whether it is rotated"], &[])),
         (ORB, &[("1920", "640"), ("1080", "480")], Only, quiet()),
+        (
+            ORB,
+            PAIR,
+            Rig,
+            Told(
+                &["not applied: Stereo.b = 0.5, a baseline of 0.5000 m: the cameras are 0.1101 m"],
+                &["`--rig`"],
+            ),
+        ),
+        (ORB, PAIR_WITH_BF, Rig, Told(&[], &["not applied"])),
         (ORB, &[("1920", "376"), ("1080", "240")], Only, Told(&["not of 376 x 240"], &[])),
         (
             CHAIN,
@@ -393,6 +414,9 @@ fn keys_that_a_format_defines_are_read_or_refused() {
     const CHAIN: &str = "30-chain-both-directions/C26d_bothdirs.yaml";
     const K: &str = "\"k1\":0.02,\"k2\":0.01,\"w\":320,\"h\":240";
     const FISHEYE: &str = "\"is_fisheye\":true";
+    const FLAT: (&str, &str) = (FISHEYE, "\"is_fisheye\":false");
+    const ANGLE_X: &str = "\"camera_angle_x\":1.9,\"fl_x\":300.5,\"fl_y\":301.5";
+    const PLAIN_2: &[f64] = &[0.05, -0.01];
     const SECOND: &str = "\"images/0002.png\",\"fl_x\":500";
     let cases: Vec<Case> = vec![
         (
@@ -460,6 +484,34 @@ fn keys_that_a_format_defines_are_read_or_refused() {
         (NGP_2, &[("\"p1\":0.0", "\"p1\":0.001")], Only, Refused(&["p1", "camera_model OPENCV"])),
         (NGP_2, &[], Only, Told(&["camera_angle_x, which says a focal length of 228"], &[])),
         (NGP_2, &[("\"fl_x\":300.5,\"fl_y\":301.5,", "")], Only, Told(&["fl_x is missing"], &[])),
+        (
+            NGP_2,
+            &[("\"fl_x\":300.5,\"fl_y\":301.5,", "\"camera_angle_y\":0.5,\"y_fov\":40,"), FLAT],
+            Only,
+            Told(
+                &["fl_y is missing: 939.9", "y_fov, which says a focal length of 659.4 px: camera_angle_y"],
+                &[],
+            ),
+        ),
+        (
+            NGP_2,
+            &[(ANGLE_X, "\"x_fov\":90,\"y_fov\":90"), FLAT],
+            Only,
+            Lens(BrownConrady, PLAIN_2, [320.0, 240.0]),
+        ),
+        (NGP_2, &[(ANGLE_X, "\"y_fov\":90"), FLAT], Only, Lens(BrownConrady, PLAIN_2, [240.0; 2])),
+        (
+            NGP_2,
+            &[(ANGLE_X, "\"fl_x\":500,\"y_fov\":90"), FLAT],
+            Only,
+            Lens(BrownConrady, PLAIN_2, [500.0, 240.0]),
+        ),
+        (
+            NGP_2,
+            &[(ANGLE_X, "\"camera_angle_x\":90"), FLAT],
+            Only,
+            Refused(&["camera_angle_x: is 90", "3.1416"]),
+        ),
         (NGP_2, &[("\"aabb", "\"latlong\":true,\"aabb")], Only, Refused(&["latlong"])),
         (OWN, &[], Only, Lens(BrownConrady, &[0.01], [500.0; 2])),
         (OWN, &[], Only, Told(&[], &["unknown", "not applied"])),

@@ -56,6 +56,25 @@ fn models_are_placed_at_their_positions_and_headings() {
 }
 
 #[test]
+fn earth_centred_vertices_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (translation, name) in [
+        ("4277000, 623000, 4672000", "earth-centred coordinates (ECEF)"),
+        ("4277000, 4672000, -623000", "earth-centred coordinates (ECEF)"),
+        // Easting and northing of Gauss-Krueger's third zone are as long.
+        ("3500000, 500, -5320000", "a map grid"),
+    ] {
+        let far = MODEL.replace("\"mesh\": 0", &format!("\"mesh\": 0, \"translation\": [{translation}]"));
+        std::fs::write(folder.path().join("far.gltf"), far).unwrap();
+        std::fs::write(folder.path().join("log.csv"), LOCAL).unwrap();
+        let text = "[flight]\nlog = \"log.csv\"\n[scene]\ngltf = [{ file = \"far.gltf\" }]\n";
+        let scenario = parse_scenario(text, &folder.path().join("scenario.toml"), &[]).unwrap();
+        let warnings = load_sequence(&scenario).unwrap().warnings.join("\n");
+        assert!(warnings.contains(name), "{translation}: {warnings}");
+    }
+}
+
+#[test]
 fn geodetic_placements_use_the_frame_of_the_log() {
     let folder = tempfile::tempdir().unwrap();
     let scene = "gltf = [{ file = \"model.gltf\", geodetic = [47.001, 8.0, 450.0] }]\n[scene.board]\nkind = \

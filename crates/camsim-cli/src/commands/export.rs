@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use camsim_core::scenario::{DatasetFormat, Scenario, validate};
-use camsim_io::dataset::{DatasetError, ExportOptions, RunFolder, Watch, export, require};
+use camsim_io::dataset::{DatasetError, ExportOptions, RunFolder, Watch, export, judge_lens, require};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::render::{RenderArgs, RenderBackend, render};
@@ -136,6 +136,17 @@ pub fn with_needs(
         }
         _ => Ok(scenario),
     }
+}
+
+/// Refuses lenses that a dataset, or in place of them `export`, has no place for.
+pub fn judge_lenses<'a>(
+    mut scenarios: impl Iterator<Item = &'a Scenario>,
+    export: Option<DatasetFormat>,
+) -> Result<(), Failure> {
+    scenarios.try_for_each(|scenario| {
+        let mut formats = scenario.output.datasets.iter().copied().chain(export);
+        formats.try_for_each(|format| judge_lens(&scenario.camera, format)).or_bad_input()
+    })
 }
 
 /// Writes the datasets of a run into its folder.

@@ -7,7 +7,7 @@ use camsim_engine::{Backend, Engine};
 use camsim_io::load::load_rig;
 use camsim_viewer::ExportJob;
 
-use super::export::{export_datasets, with_needs};
+use super::export::{export_datasets, judge_lenses, with_needs};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -36,6 +36,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let mut console = Console::new(&mut out, &mut err);
     console.set_volume(true, false);
     let rig = job.rig.clone().try_map(|scenario| with_needs(scenario, None, &mut console))?;
+    judge_lenses(rig.scenarios().iter(), None)?;
     let loaded = load_rig(&rig).or_bad_input()?;
     let [first, end] = job.frames;
     let frames: Vec<u64> = (first..end.min(loaded[job.camera].sequence.frames)).collect();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AutoExposureSpec, ChromaticSpec, Face, FieldOr, FilesOfSpec, ImageCircleSpec, ImageSensorSpec,
+    AutoExposureSpec, ChromaticSpec, Face, FieldOr, FilesOfSpec, ImageCircleSpec, ImageSensorSpec, MadeOf,
     PointSpreadSpec, Primary, ResizedSpec, TimingSpec, VignettingSpec,
 };
 use crate::{
@@ -87,9 +87,9 @@ pub struct CameraSpec {
     /// whole cameras.
     #[serde(skip)]
     pub primary: Option<Primary>,
-    /// Whether `resized` has made it of a part of a picture, so that its axis may be anywhere.
+    /// What `resized` has made it of, for those who judge its values.
     #[serde(skip)]
-    pub is_part: bool,
+    pub made_of: MadeOf,
 }
 
 impl Default for CameraSpec {
@@ -119,7 +119,7 @@ impl Default for CameraSpec {
             resized: None,
             files_of: None,
             primary: None,
-            is_part: false,
+            made_of: MadeOf::default(),
         }
     }
 }

@@ -62,6 +62,24 @@ pub struct FilesOfSpec {
     pub part_px: [f64; 4],
 }
 
+/// What of a resized camera cannot be told from its keys.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MadeOf {
+    /// Whether it has a part of a picture, so that its axis may be anywhere.
+    pub is_part: bool,
+    /// Factor across over that down: pixels that were square have this ratio of focal lengths.
+    pub squeeze: f64,
+    /// By how much its rows are later than the same rows of the whole picture, milliseconds: the centre of a part
+    /// takes the time that the centre of the whole picture had.
+    pub rows_later_ms: f64,
+}
+
+impl Default for MadeOf {
+    fn default() -> Self {
+        Self { is_part: false, squeeze: 1.0, rows_later_ms: 0.0 }
+    }
+}
+
 impl FilesOfSpec {
     /// The point of its picture that a point of the camera's picture, of this size, is.
     #[must_use]
@@ -235,7 +253,11 @@ impl Resizing {
             given => Some(self.pair(given.unwrap_or(centre))),
         };
         new.resized = None;
-        new.is_part = camera.is_part || !is_whole;
+        new.made_of = MadeOf {
+            is_part: camera.made_of.is_part || !is_whole,
+            squeeze: camera.made_of.squeeze * self.scale.x / self.scale.y,
+            rows_later_ms: camera.made_of.rows_later_ms + self.rows_later_ms(camera),
+        };
         new.files_of = self.files_of(camera, centre);
         new.size_px = self.size_px;
         new.focal_px = self.focal(camera.focal_px);
@@ -290,12 +312,8 @@ impl Resizing {
     /// earlier than the centre where they are the means of several rows.
     fn shutter(&self, camera: &CameraSpec) -> ShutterSpec {
         let mut shutter = camera.shutter.clone();
-        let axis = match shutter.readout {
-            Readout::LeftToRight | Readout::RightToLeft => 0,
-            _ => 1,
-        };
+        let (axis, row_ms) = readout_axis(camera);
         let share = f64::from(self.part_px[2 + axis]) / f64::from(camera.size_px[axis]);
-        let row_ms = camera.readout_ms() / f64::from(camera.size_px[axis]);
         let later_ms = (1.0 / self.scale[axis] - 1.0) * row_ms;
         match shutter.readout {
             Readout::MiddleOutward => shutter.delay_ms -= later_ms,
@@ -313,6 +331,18 @@ impl Resizing {
             };
         }
         shutter
+    }
+
+    /// [`MadeOf::rows_later_ms`] of this change. Halves are always about the centre.
+    fn rows_later_ms(&self, camera: &CameraSpec) -> f64 {
+        let (axis, row_ms) = readout_axis(camera);
+        let whole = f64::from(camera.size_px[axis]);
+        let behind_centre = f64::from(self.part_px[axis]) + 0.5 * (f64::from(self.part_px[2 + axis]) - whole);
+        match camera.shutter.readout {
+            Readout::TopToBottom | Readout::LeftToRight => -behind_centre * row_ms,
+            Readout::BottomToTop | Readout::RightToLeft => behind_centre * row_ms,
+            Readout::MiddleOutward | Readout::EdgesInward => 0.0,
+        }
     }
 
     /// Radii of the calibrated picture over those of the delivered one, each over the `unit` of its picture.
@@ -368,6 +398,15 @@ impl CameraSpec {
         let problems = change.problems(self);
         if problems.is_empty() { Ok(change.apply(self)) } else { Err(problems) }
     }
+}
+
+/// Axis along which a camera is read, and the time from one row or column to the next.
+fn readout_axis(camera: &CameraSpec) -> (usize, f64) {
+    let axis = match camera.shutter.readout {
+        Readout::LeftToRight | Readout::RightToLeft => 0,
+        _ => 1,
+    };
+    (axis, camera.readout_ms() / f64::from(camera.size_px[axis]))
 }
 
 /// Keys of a camera whose numbers are lengths in any direction of the picture.

@@ -72,10 +72,13 @@ pub(crate) fn euroc_note(camera: &Calibration, label: &str) -> Option<String> {
     let (name, _) = lens(Family::Euroc, camera).ok().filter(|(name, _)| *name == EIGHT)?;
     Some(format!(
         "sensor.yaml of {label} has the lens as {name} (k1 k2 p1 p2 k3 k4 k5 k6), which OKVIS knows; readers that know \
-         EuRoC's own radial-tangential alone have no place for k3: give them a twin without lens ([[output.twin]] lens \
-         = false), or a lens of k1 k2 p1 p2"
+         EuRoC's own radial-tangential alone have no place for k3: give them a lens of k1 k2 p1 p2 or pictures without lens ({TWIN_ADVICE})"
     ))
 }
+
+/// How to get pictures without lens.
+const TWIN_ADVICE: &str = "render the scenario without this export and with `[[output.twin]]`, name = \"plain\", lens = \
+                           false, and export the twin's folder: `camsim export OUT/plain --as ...`, or its OUT/plain/camera.toml with `camsim camera export`";
 
 /// The error of a format without the lens.
 pub(crate) fn no_such_lens(camera: &Calibration, format: &str) -> CalibrationError {
@@ -85,7 +88,7 @@ pub(crate) fn no_such_lens(camera: &Calibration, format: &str) -> CalibrationErr
     };
     CalibrationError::Refused(format!(
         "{}: {format} has no {reason} ({:?}): `camsim camera export --as stmap` writes any lens, and a twin without lens \
-         ([[output.twin]] lens = false) needs none",
+         needs none: {TWIN_ADVICE}",
         camera.label(),
         camera.spec.lens.coefficients
     ))

@@ -37,8 +37,8 @@ pub(super) const KEYS: &[KeyRow] = &[
     ),
     KeyRow::new("w", Treatment::Applied, "width; give --size if it is missing"),
     KeyRow::new("h", Treatment::Applied, "height"),
-    KeyRow::new("fl_x", Treatment::Applied, "px; from camera_angle_x and w if missing"),
-    KeyRow::new("fl_y", Treatment::Applied, "px; fl_x if missing"),
+    KeyRow::new("fl_x", Treatment::Applied, "px; from an angle of view across and w if missing, else fl_y"),
+    KeyRow::new("fl_y", Treatment::Applied, "px; from an angle of view down and h if missing, else fl_x"),
     KeyRow::new(
         "cx",
         Treatment::Applied,
@@ -53,7 +53,9 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("p2", Treatment::Applied, COEFFICIENT),
     KeyRow::new("distortion_params", Treatment::Applied, "k1 k2 k3 k4 p1 p2"),
     KeyRow::new("camera_angle_x", Treatment::Applied, "radians; named if fl_x is another focal length"),
-    KeyRow::new("camera_angle_y", Treatment::Ignored, "angle of view, which fl_y and h give too"),
+    KeyRow::new("camera_angle_y", Treatment::Applied, "radians; named if fl_y is another focal length"),
+    KeyRow::new("x_fov", Treatment::Applied, "degrees, like camera_angle_x"),
+    KeyRow::new("y_fov", Treatment::Applied, "degrees, like camera_angle_y"),
     KeyRow::new("rolling_shutter", Treatment::Reported(Neutral::Zero), SHUTTER),
     KeyRow::new("ftheta_*", Treatment::Refused(Neutral::Zero), OTHER_LENS),
     KeyRow::new("latlong", Treatment::Refused(Neutral::Zero), OTHER_LENS),
@@ -73,7 +75,9 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("frames.p2", Treatment::Applied, OWN),
     KeyRow::new("frames.distortion_params", Treatment::Applied, OWN),
     KeyRow::new("frames.camera_angle_x", Treatment::Applied, OWN),
-    KeyRow::new("frames.camera_angle_y", Treatment::Ignored, "angle of view, which fl_y and h give too"),
+    KeyRow::new("frames.camera_angle_y", Treatment::Applied, OWN),
+    KeyRow::new("frames.x_fov", Treatment::Applied, OWN),
+    KeyRow::new("frames.y_fov", Treatment::Applied, OWN),
     KeyRow::new("frames.rolling_shutter", Treatment::Reported(Neutral::Zero), SHUTTER),
     KeyRow::new("frames.ftheta_*", Treatment::Refused(Neutral::Zero), OTHER_LENS),
     KeyRow::new("frames.latlong", Treatment::Refused(Neutral::Zero), OTHER_LENS),
@@ -94,14 +98,15 @@ pub(super) const KEYS: &[KeyRow] = &[
     KeyRow::new("*_filenames", Treatment::Ignored, POSES),
 ];
 
-/// Keys of a camera but those of its distortion.
-const CAMERA: [&str; 9] =
-    ["camera_model", "is_fisheye", "w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x"];
+/// Keys of a camera but those of its focal length and its distortion.
+const CAMERA: [&str; 6] = ["camera_model", "is_fisheye", "w", "h", "cx", "cy"];
+/// Keys of the focal length across and down: pixels, and the angle of view in radians and in degrees.
+const FOCAL: [[&str; 3]; 2] = [["fl_x", "camera_angle_x", "x_fov"], ["fl_y", "camera_angle_y", "y_fov"]];
 /// Keys of the distortion: frames have their own only where the root has none of them.
 const DISTORTION: [&str; 7] = ["k1", "k2", "k3", "k4", "p1", "p2", "distortion_params"];
 
 fn camera_keys() -> impl Iterator<Item = &'static str> {
-    CAMERA.into_iter().chain(DISTORTION)
+    CAMERA.into_iter().chain(FOCAL.into_iter().flatten()).chain(DISTORTION)
 }
 
 fn frames(root: &Value) -> &[Value] {
@@ -130,8 +135,8 @@ fn camera_of(root: &Value, frame: &Value) -> Map<String, Value> {
 
 pub(super) fn matches(document: &Document) -> bool {
     let root = &document.value;
-    let has_focal = |value: &Value| ["fl_x", "camera_angle_x"].iter().any(|key| find(value, key).is_some());
-    let is_complete = find(root, "fl_x").is_some() && find(root, "w").is_some();
+    let has_focal = |value: &Value| FOCAL.iter().flatten().any(|key| find(value, key).is_some());
+    let is_complete = has_focal(root) && find(root, "w").is_some();
     let has_frames = !frames(root).is_empty();
     document.root.is_empty()
         && (is_complete || has_frames && (has_focal(root) || frames(root).iter().any(has_focal)))
@@ -197,12 +202,16 @@ pub(super) fn import(document: &Document, entry: &CameraEntry<'_>) -> Result<Imp
     let focal_px = match model {
         // A turn is twice fl_x there, half a turn fl_y.
         LensModel::Equirectangular => {
+            let angles = FOCAL.iter().flat_map(|keys| &keys[1..]).filter(|key| find(value, key).is_some());
+            notes.extend(
+                angles.map(|key| format!("not applied: {key}, as EQUIRECTANGULAR has fl_x and fl_y")),
+            );
             let or = |key: &str, default: f64| {
                 optional_number(value, key).map(|focal| focal.unwrap_or(default) / PI)
             };
             [or("fl_x", 0.5 * width)?, or("fl_y", height)?]
         }
-        _ => focal_px(value, width, &mut notes)?,
+        _ => focal_px(value, [width, height], &mut notes)?,
     };
     let centre = |key: &str, side: f64| optional_number(value, key).map(|c| c.unwrap_or(0.5 * side) - 0.5);
     let point = [centre("cx", width)?, centre("cy", height)?];
@@ -272,25 +281,52 @@ fn sized(value: &Value, key: &str) -> Result<f64, KeyProblem> {
     }
 }
 
-/// Focal lengths, from the angle of view if there are none.
-fn focal_px(value: &Value, width: f64, notes: &mut Vec<String>) -> Result<[f64; 2], KeyProblem> {
-    let angle_rad = optional_number(value, "camera_angle_x")?;
-    let by_angle = angle_rad.map(|angle_rad| 0.5 * width / (0.5 * angle_rad).tan());
-    let fx = match (optional_number(value, "fl_x")?, by_angle) {
-        (Some(fx), Some(other)) if (fx / other - 1.0).abs() > 0.01 => {
-            notes.push(format!(
-                "not applied: camera_angle_x, which says a focal length of {other:.1} px: fl_x is {fx}"
-            ));
-            fx
+/// Focal lengths, from the angles of view if there are none; of an axis without either, that of the other.
+fn focal_px(value: &Value, size: [f64; 2], notes: &mut Vec<String>) -> Result<[f64; 2], KeyProblem> {
+    let across = axis_focal_px(value, FOCAL[0], size[0], notes)?;
+    let down = axis_focal_px(value, FOCAL[1], size[1], notes)?;
+    match (across, down) {
+        (Some(fx), fy) => Ok([fx, fy.unwrap_or(fx)]),
+        (None, Some(fy)) => {
+            notes.push(format!("fl_x is missing: it is the focal length down, {fy:.3} px"));
+            Ok([fy; 2])
         }
-        (Some(fx), _) => fx,
-        (None, Some(fx)) => {
-            notes.push(format!("fl_x is missing: {fx:.3} px is from camera_angle_x"));
-            fx
+        (None, None) => Err(KeyProblem::new("fl_x", "is missing")),
+    }
+}
+
+/// Focal length by the first of the keys that is there; others that say another one are named.
+fn axis_focal_px(
+    value: &Value,
+    keys: [&'static str; 3],
+    side: f64,
+    notes: &mut Vec<String>,
+) -> Result<Option<f64>, KeyProblem> {
+    let units = [None, Some(1.0), Some(1_f64.to_radians())];
+    let mut used: Option<(&str, f64)> = None;
+    for (key, unit) in keys.into_iter().zip(units) {
+        let Some(given) = optional_number(value, key)? else { continue };
+        let px = unit.map_or(given, |unit| 0.5 * side / (0.5 * given * unit).tan());
+        let is_angle = unit.is_none_or(|unit| given > 0.0 && given * unit < PI);
+        match used {
+            None if !is_angle => {
+                let half_turn = PI / unit.unwrap_or(1.0);
+                let text = format!("is {given}, and an angle of view lies between 0 and {half_turn:.4}");
+                return Err(KeyProblem::new(key, text));
+            }
+            None => used = Some((key, px)),
+            Some((first, of_first)) if !is_angle || (of_first / px - 1.0).abs() > 0.01 => {
+                notes.push(format!(
+                    "not applied: {key}, which says a focal length of {px:.1} px: {first} says {of_first:.1}"
+                ));
+            }
+            Some(_) => {}
         }
-        (None, None) => return Err(KeyProblem::new("fl_x", "is missing")),
-    };
-    Ok([fx, optional_number(value, "fl_y")?.unwrap_or(fx)])
+    }
+    if let Some((key, px)) = used.filter(|(key, _)| *key != keys[0]) {
+        notes.push(format!("{} is missing: {px:.3} px is from {key}", keys[0]));
+    }
+    Ok(used.map(|(_, px)| px))
 }
 
 /// Refuses frames that state another value than the root: the programs differ in which counts.

@@ -277,6 +277,10 @@ impl Extrinsics {
             if self.placement.is_none() && pair.is_some() {
                 self.placement = Some(Placement::InFirst(Rigid::IDENTITY));
             }
+            // The second camera is placed and judged by them.
+            if let Some(key) = pair {
+                self.applied.extend([key, "Stereo.b", "Camera.bf"].map(str::to_owned));
+            }
             return Ok(());
         }
         let Some(key) = pair else {
@@ -285,10 +289,30 @@ impl Extrinsics {
             return Ok(());
         };
         let first_from_camera = self.matrix(root, "", key)?;
+        self.judge_baselines(root, key, first_from_camera.translation_m.length())?;
         self.placement = Some(match self.placement {
             Some(Placement::InBody(b_from_first)) => Placement::InBody(b_from_first.of(&first_from_camera)),
             _ => Placement::InFirst(first_from_camera),
         });
+        Ok(())
+    }
+
+    /// Names baselines that differ from that of the pose.
+    fn judge_baselines(&mut self, root: &Value, pose: &str, metres: f64) -> Result<(), KeyProblem> {
+        let focal = one_of(root, &["Camera1.fx", "Camera.fx"])?;
+        let focal_px = focal.map(|key| number(root, key)).transpose()?;
+        // The focal length of Camera.bf may be that of rectified pictures.
+        for (key, per_metre, most_off) in [("Stereo.b", Some(1.0), 0.02), ("Camera.bf", focal_px, 0.1)] {
+            let (Some(stated), Some(per_metre)) = (optional_number(root, key)?, per_metre) else { continue };
+            let baseline_m = stated / per_metre;
+            if (baseline_m - metres).abs() > most_off * metres {
+                self.notes.push(format!(
+                    "not applied: {key} = {stated}, a baseline of {baseline_m:.4} m: the cameras are {metres:.4} m apart by \
+                     {pose}, which is used; correct the wrong one"
+                ));
+            }
+            self.applied.push(key.to_owned());
+        }
         Ok(())
     }
 

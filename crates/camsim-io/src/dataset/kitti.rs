@@ -163,6 +163,17 @@ fn write_flow(
     })
 }
 
+/// Which camera is in which folders.
+fn cameras_of(views: &[RunCamera], sequence: &[usize]) -> String {
+    let folders = GREY.iter().zip(COLOR);
+    let placed = sequence.iter().zip(folders).map(|(&camera, (grey, color))| {
+        let name = &views[camera].name;
+        let named = if name.is_empty() { String::new() } else { format!(" ({name})") };
+        format!("cam{camera}{named} in `{grey}` and `{color}`")
+    });
+    placed.collect::<Vec<_>>().join(", ")
+}
+
 fn page(job: &ExportJob<'_>, views: &[RunCamera], sequences: &[Vec<usize>], notes: &[String]) -> String {
     let mut page = Page::new("KITTI: odometry, depth, flow", job);
     page.line("camera", OPTICAL)
@@ -191,6 +202,7 @@ fn page(job: &ExportJob<'_>, views: &[RunCamera], sequences: &[Vec<usize>], note
              `flow_occ`: hidden ones and those outside, too. To the time of the row that sees the point",
         );
     for (i, sequence) in sequences.iter().enumerate() {
+        page.line(&format!("cameras of sequence {i:02}"), &cameras_of(views, sequence));
         page.line(&format!("shutter of sequence {i:02}"), &timing(&views[sequence[0]]));
     }
     notes.iter().for_each(|note| {

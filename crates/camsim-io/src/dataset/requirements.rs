@@ -1,10 +1,17 @@
 //! What a scenario has to write for a layout.
 
 use camsim_core::scenario::{
-    Channel, DatasetFormat, ImageFormat, LensModel, OutputSpec, PointSource, Scenario, TracksSpec,
+    CameraSpec, Channel, DatasetFormat, ImageFormat, LensModel, OutputSpec, PointSource, Scenario, TracksSpec,
 };
 
 use super::{DatasetError, twins::TwinNeed};
+use crate::calibration::{
+    Calibration,
+    colmap::camera_model,
+    kalibr::{PoseKey, chain_yaml},
+    lens_names::{Family, lens},
+    nerfstudio,
+};
 
 /// Adds to a scenario what a layout needs: channels, formats, twins, tracks. What is there stays. Returns what
 /// was added, in words.
@@ -54,6 +61,27 @@ pub fn require(scenario: &mut Scenario, format: DatasetFormat) -> Result<Vec<Str
     };
     twins.iter().try_for_each(|need| add_twin(output, *need, &[Channel::Color], &mut added))?;
     Ok(added)
+}
+
+/// Judges the lens of a camera before anything is rendered.
+///
+/// # Errors
+/// The layout has no place for it.
+pub fn judge_lens(camera: &CameraSpec, format: DatasetFormat) -> Result<(), DatasetError> {
+    let calibration = || Calibration::new(camera);
+    match format {
+        DatasetFormat::Euroc => lens(Family::Euroc, &calibration()?).map(drop)?,
+        DatasetFormat::Tum | DatasetFormat::Mcap => lens(Family::Ros, &calibration()?).map(drop)?,
+        DatasetFormat::Colmap => camera_model(&calibration()?).map(drop)?,
+        DatasetFormat::Nerfstudio => nerfstudio::model(&calibration()?).map(drop)?,
+        DatasetFormat::Kalibr => chain_yaml(&[calibration()?], None, PoseKey::CamImu).map(drop)?,
+        DatasetFormat::Kitti
+        | DatasetFormat::CarlaRs
+        | DatasetFormat::Gopro
+        | DatasetFormat::Webdataset
+        | DatasetFormat::Flo => {}
+    }
+    Ok(())
 }
 
 /// Whether a layout has a pose for each picture.

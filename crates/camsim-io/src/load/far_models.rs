@@ -13,6 +13,10 @@ use crate::wording::rounded;
 const NEAR_M: f64 = 1000.0;
 /// Sizes of a model from which it is far.
 const FAR_SIZES: f64 = 20.0;
+/// Distances of places on the ground from the Earth's centre, metres.
+const EARTH_RADII_M: std::ops::RangeInclusive<f64> = 6.35e6..=6.39e6;
+/// Height that no place on the ground has, metres.
+const HIGHEST_M: f64 = 9e3;
 /// Spacing of 32-bit numbers from which it is reported, metres.
 const COARSE_M: f64 = 0.01;
 
@@ -66,10 +70,25 @@ pub(super) fn notes(
     far.into_iter().chain(coarse).collect()
 }
 
+/// Whether vertices lie as far from their origin as places on the ground from the Earth's centre, NED. Coordinates of
+/// a map grid may have that length too, but are low.
+fn is_earth_centred(from_origin: DVec3) -> bool {
+    EARTH_RADII_M.contains(&from_origin.length()) && from_origin.z.abs() > HIGHEST_M
+}
+
 fn far_note(scenario: &Scenario, spec: &GltfSpec, copy: &Copy, distance_m: f64) -> Option<String> {
     let centre = copy.bounds.centre();
     let from_origin = centre - copy.origin_ned_m;
     let km = rounded(distance_m / 1e3);
+    if is_earth_centred(from_origin) && centre.length() > 0.5 * from_origin.length() {
+        return Some(format!(
+            "the model is {km} km from the flight: its vertices lie {} km from its own origin, as far as the ground from \
+             the Earth's centre, and look like earth-centred coordinates (ECEF): subtract those of a place of the model, \
+             turn it so that up is +Y and north is -Z, and place it with geodetic, the latitude, longitude and height of \
+             that place",
+            rounded(from_origin.length() / 1e3)
+        ));
+    }
     if distance_m > NEAR_M.max(FAR_SIZES * copy.size_m())
         && from_origin.truncate().length() > 0.5 * distance_m
     {

@@ -5,7 +5,7 @@ use camsim_core::{
     scenario::{CameraSpec, Reset},
 };
 
-use crate::unlikely_camera;
+use crate::{unlikely_camera, wording::rounded};
 
 /// What to do where a size has been changed without the calibration.
 const RESIZE_ADVICE: &str = " (to make the pictures of a camera smaller or larger with its calibration, leave \
@@ -21,6 +21,7 @@ pub(super) fn unlikely_values(camera: &CameraSpec) -> Vec<String> {
         .chain(noise_warning(camera))
         .chain(full_well_warning(camera))
         .chain(reset_warning(camera))
+        .chain(part_warning(camera))
         .collect()
 }
 
@@ -62,9 +63,37 @@ fn reset_warning(camera: &CameraSpec) -> Option<String> {
     })
 }
 
+/// Rows of a part beside the centre have other times than in the whole picture.
+fn part_warning(camera: &CameraSpec) -> Option<String> {
+    let later_ms = camera.made_of.rows_later_ms;
+    let delay_ms = camera.shutter.delay_ms;
+    // Less than half a row comes from rows that are left over when others are added up.
+    let [width, height] = camera.size_px.map(f64::from);
+    (later_ms.abs() > 0.51 * camera.readout_ms() / width.min(height)).then(|| {
+        let kept_ms = delay_ms + later_ms;
+        let to_keep = if kept_ms >= 0.0 {
+            format!("camera.shutter.delay_ms = {} keeps their times", rounded(kept_ms))
+        } else {
+            format!(
+                "their times need a delay of {} ms, and it is never below 0: render the whole picture and cut it",
+                rounded(kept_ms)
+            )
+        };
+        format!(
+            "camera.resized: the part is not about the centre, and camera.shutter.delay_ms = {delay_ms} is that of the \
+             part's own centre, so that its rows are exposed {} ms {} than the same rows of the whole picture; if it is cut \
+             from whole pictures, {to_keep}",
+            rounded(later_ms.abs()),
+            if later_ms > 0.0 { "later" } else { "earlier" }
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use camsim_core::scenario::{AutoExposureSpec, ImageSensorSpec, SensorModel, ShutterSpec};
+    use camsim_core::scenario::{
+        AutoExposureSpec, ImageSensorSpec, MadeOf, ResizedSpec, SensorModel, ShutterSpec,
+    };
 
     use super::*;
 
@@ -100,7 +129,30 @@ mod tests {
         }
         assert_eq!(text(camera([640, 480], demo)), "");
         assert_eq!(text(camera([320, 240], None)), "");
-        assert_eq!(text(CameraSpec { is_part: true, ..camera([320, 240], demo) }), "");
+        assert_eq!(
+            text(CameraSpec {
+                made_of: MadeOf { is_part: true, ..MadeOf::default() },
+                ..camera([320, 240], demo)
+            }),
+            ""
+        );
+    }
+
+    #[test]
+    fn rows_of_a_part_that_are_exposed_at_another_time_are_told() {
+        let text = |crop_px, delay_ms| {
+            let shutter = ShutterSpec { readout_ms: 20.0, delay_ms, ..ShutterSpec::default() };
+            let resized = ResizedSpec { crop_px: Some(crop_px), ..ResizedSpec::default() };
+            let camera =
+                CameraSpec { shutter, resized: Some(resized), size_px: [160, 120], ..CameraSpec::default() };
+            part_warning(&camera.resized().expect("the part is within the picture")).unwrap_or_default()
+        };
+        // 30 rows of 20 / 120 ms.
+        let above = text([0, 0, 160, 60], 1.0);
+        assert!(above.contains("exposed 5 ms later") && above.contains("delay_ms = 6 keeps"), "{above}");
+        let below = text([0, 60, 160, 60], 1.0);
+        assert!(below.contains("exposed 5 ms earlier") && below.contains("a delay of -4 ms"), "{below}");
+        assert_eq!(text([0, 30, 80, 60], 1.0), "");
     }
 
     #[test]

@@ -14,6 +14,9 @@ pub(crate) const PHOTOMETRICS: &[(u64, &str, &str)] = &[
     (8, "CIELab", "refused, with the command that converts"),
 ];
 
+/// How to say which bands are colours.
+const CHOOSE: &str = "to choose, run `gdal_translate -b RED -b GREEN -b BLUE -co PHOTOMETRIC=RGB IN OUT`";
+
 /// Tag 338 (ExtraSamples): premultiplied alpha.
 const ASSOCIATED: u64 = 1;
 /// Tag 338 (ExtraSamples): straight alpha.
@@ -47,7 +50,7 @@ pub(super) fn may_be_alpha(meaning: Option<&BandMeaning>) -> bool {
 /// Words of bands that are light, visible or not.
 fn is_light(word: &str) -> bool {
     matches!(
-        word,
+        word.trim_end_matches(|c: char| c.is_ascii_digit()),
         "red"
             | "green"
             | "blue"
@@ -58,11 +61,21 @@ fn is_light(word: &str) -> bool {
             | "near"
             | "rededge"
             | "edge"
+            | "vnir"
             | "swir"
+            | "mir"
+            | "mwir"
+            | "lwir"
+            | "tir"
             | "yellow"
+            | "orange"
+            | "violet"
+            | "uv"
+            | "ultraviolet"
             | "coastal"
             | "thermal"
             | "pan"
+            | "panchromatic"
     )
 }
 
@@ -122,6 +135,14 @@ fn described_rgb(image: &Image, meanings: &[BandMeaning]) -> Option<[usize; 3]> 
     Some([rgb[0]?, rgb[1]?, rgb[2]?])
 }
 
+/// Whether a description says that a band is not this colour: it names another one, or other light.
+fn is_described_otherwise(band: &BandMeaning, color: usize) -> bool {
+    band.description.as_deref().is_some_and(|text| match described_color(text) {
+        Some(described) => described != color,
+        None => described_words(text).iter().any(|word| is_light(word)),
+    })
+}
+
 /// The descriptions of a picture's bands for a message, if it has any.
 fn quoted_descriptions(image: &Image, meanings: &[BandMeaning]) -> Option<String> {
     let bands = meanings.iter().take(image.bands).map(|band| band.description.as_deref().unwrap_or("-"));
@@ -158,10 +179,15 @@ impl ColorBands {
         let is_premultiplied = alpha.is_some() && alpha == extra(ASSOCIATED);
         let described = described_rgb(image, meanings);
         let listed = quoted_descriptions(image, meanings).unwrap_or_default();
+        let contradicts = |rgb: [usize; 3]| {
+            rgb.iter().enumerate().any(|(color, band)| {
+                meanings.get(*band).is_some_and(|band| is_described_otherwise(band, color))
+            })
+        };
         let rgb = match [band_named("Red"), band_named("Green"), band_named("Blue")] {
             [Some(red), Some(green), Some(blue)] => {
                 let interpreted = [red, green, blue];
-                if described.is_some_and(|described| described != interpreted) {
+                if contradicts(interpreted) {
                     notes.push(format!(
                         "its bands are described as {listed}, but their colour interpretation has red, green and blue \
                          in bands {}, which is used: correct one of them",
@@ -182,7 +208,15 @@ impl ColorBands {
             }
             _ => match image.photometric {
                 0 | 1 | 3 | 4 if image.bands < 3 || image.photometric == 3 => [0; 3],
-                2 if image.bands >= 3 => [0, 1, 2],
+                2 if image.bands >= 3 => {
+                    if contradicts([0, 1, 2]) {
+                        notes.push(format!(
+                            "is RGB by its photometric interpretation, but its bands are described as {listed}: the first \
+                             three are used as red, green and blue; {CHOOSE}"
+                        ));
+                    }
+                    [0, 1, 2]
+                }
                 0 | 1 if image.bands - usize::from(alpha.is_some()) >= 3 => {
                     let described = if listed.is_empty() {
                         String::new()
@@ -191,8 +225,7 @@ impl ColorBands {
                     };
                     notes.push(format!(
                         "does not state which of its bands are red, green and blue{described}: the first three are \
-                         used; to choose, run `gdal_translate -b RED -b GREEN -b BLUE -co PHOTOMETRIC=RGB IN \
-                         OUT`"
+                         used; {CHOOSE}"
                     ));
                     [0, 1, 2]
                 }

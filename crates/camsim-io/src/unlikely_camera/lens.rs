@@ -17,17 +17,13 @@ const FEW_RAYS: f64 = 0.6;
 /// Largest usual tangential coefficient; those of published calibrations are below 0.013.
 const MOST_TANGENTIAL: f64 = 0.03;
 
-/// What is odd about a lens over the picture.
-pub(super) fn doubts(camera: &CameraSpec) -> Vec<Doubt> {
-    let seen = model(camera).map(|model| Seen::over(&model, camera.lens.model));
-    [
-        seen.as_ref().and_then(Seen::rays_doubt),
-        seen.as_ref().and_then(Seen::scale_doubt),
-        tangential_doubt(camera),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+/// What is odd about the rays of a lens over the picture. That an image circle leaves pixels empty is meant.
+pub(super) fn doubts_of_rays(camera: &CameraSpec) -> Vec<Doubt> {
+    let bare = CameraSpec { image_circle: None, ..camera.clone() };
+    let Some(seen) = model(&bare).map(|model| Seen::over(&model, camera.lens.model)) else {
+        return Vec::new();
+    };
+    [seen.rays_doubt(&camera.lens.coefficients), seen.scale_doubt()].into_iter().flatten().collect()
 }
 
 /// What a grid of pixels sees.
@@ -72,9 +68,9 @@ impl Seen {
         }
     }
 
-    fn rays_doubt(&self) -> Option<Doubt> {
+    fn rays_doubt(&self, coefficients: &[f64]) -> Option<Doubt> {
         let share = f64::from(self.with_ray) / f64::from(self.pixels.max(1));
-        let few = match share < FEW_RAYS {
+        let few = match share < FEW_RAYS && !coefficients.is_empty() {
             true => format!(
                 ": {:.0} % of the pixels have a ray, so check the order and the scale of the coefficients; see",
                 100.0 * share
@@ -121,7 +117,7 @@ fn is_unlike(lens: LensModel, angle: f64, plain: f64) -> bool {
 }
 
 /// Terms in another order: `k1 k2 k3 p1 p2` as `k1 k2 p1 p2 k3`.
-fn tangential_doubt(camera: &CameraSpec) -> Option<Doubt> {
+pub(super) fn tangential_doubt(camera: &CameraSpec) -> Option<Doubt> {
     if !is_flat(camera.lens.model) {
         return None;
     }

@@ -13,12 +13,11 @@ const OTHER_SIZE: f64 = 1.15;
 /// The same if they do not agree, because the other picture has another aspect.
 const OTHER_ASPECT: f64 = 1.3;
 
-/// A principal point that would be the centre of another picture, or is far from the centre of this one.
-pub(super) fn doubt(camera: &CameraSpec) -> Option<Doubt> {
+/// A principal point that belongs to a picture of another size or with another origin.
+pub(super) fn doubt_of_other_picture(camera: &CameraSpec) -> Option<Doubt> {
     let point = camera.principal_point_px?;
     let size = camera.size_px.map(f64::from);
-    // Zero and one are the borders.
-    let shares = [0, 1].map(|axis| (point[axis] + 0.5) / size[axis]);
+    let shares = shares(point, size);
     let is_corner = shares.iter().all(|share| share.abs() < CORNER || (share - 1.0).abs() < CORNER);
     // The last corner would be the centre of a picture of twice the size.
     let problem = if is_corner && shares.iter().any(|share| share.abs() < CORNER) {
@@ -33,15 +32,28 @@ pub(super) fn doubt(camera: &CameraSpec) -> Option<Doubt> {
             "is outside of the picture of {}: check that the size is that of the calibration",
             times(size)
         )
-    } else if shares.iter().any(|share| (share - 0.5).abs() > USUAL) {
-        format!(
-            "is far from the centre of the picture of {}: check it, and that the size is that of the calibration",
-            times(size)
-        )
     } else {
         return None;
     };
     Some(Doubt::of("principal_point_px", point, problem))
+}
+
+/// A principal point far from the centre.
+pub(super) fn far_doubt(camera: &CameraSpec) -> Option<Doubt> {
+    let point = camera.principal_point_px?;
+    let size = camera.size_px.map(f64::from);
+    shares(point, size).iter().any(|share| (share - 0.5).abs() > USUAL).then(|| {
+        let problem = format!(
+            "is far from the centre of the picture of {}: check it, and that the size is that of the calibration",
+            times(size)
+        );
+        Doubt::of("principal_point_px", point, problem)
+    })
+}
+
+/// Where a point lies along the sides; zero and one are the borders.
+fn shares(point: [f64; 2], size: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|axis| (point[axis] + 0.5) / size[axis])
 }
 
 /// What to say of a principal point that would be the centre of a picture of another size.

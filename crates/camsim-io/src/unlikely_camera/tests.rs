@@ -1,4 +1,4 @@
-use camsim_core::scenario::{LensSpec, ShutterSpec};
+use camsim_core::scenario::{Binning, ImageCircleSpec, LensSpec, ResizedSpec, ShutterSpec};
 
 use super::*;
 
@@ -104,6 +104,42 @@ fn lenses_that_no_glass_makes_are_told() {
 }
 
 #[test]
+fn a_wrong_size_or_focal_length_is_told_once() {
+    let lens = |size_px, focal_px| CameraSpec {
+        size_px,
+        principal_point_px: Some([367.215, 248.375]),
+        ..lens(LensModel::BrownConrady, focal_px, &[-0.283, 0.0739, 0.0002, 0.00002])
+    };
+    for (camera, key) in
+        [(lens([1920, 1080], 458.0), "principal_point_px"), (lens([752, 480], 4.2), "focal_px")]
+    {
+        let told = doubts_of_calibration(&camera);
+        assert!(told.len() == 1 && told[0].key() == key, "{told:?}");
+    }
+}
+
+#[test]
+fn pixels_beyond_the_image_circle_are_meant() {
+    let circle = ImageCircleSpec { radius_px: Some(40.0), ..ImageCircleSpec::default() };
+    for coefficients in [&[][..], &[-0.28, 0.07, 0.0002, 0.00002]] {
+        let lens = lens(LensModel::BrownConrady, 500.0, coefficients);
+        assert_eq!(told(&CameraSpec { image_circle: Some(circle.clone()), ..lens }), "");
+    }
+}
+
+#[test]
+fn pixels_of_unequal_numbers_are_not_square() {
+    let binned = |focal_px| {
+        let binning = Some(Binning::Each([2.0, 1.0]));
+        let resized = Some(ResizedSpec { binning, ..ResizedSpec::default() });
+        let camera = CameraSpec { focal_px, resized, ..CameraSpec::default() };
+        told(&camera.resized().expect("640 is even"))
+    };
+    assert_eq!(binned([500.0, 505.0]), "");
+    assert!(binned([1000.0, 500.0]).contains("differs by 100 %"));
+}
+
+#[test]
 fn arms_clocks_and_readouts_of_another_unit_are_told() {
     let camera = |change: fn(&mut CameraSpec)| {
         let mut camera = lens(LensModel::Pinhole, 500.0, &[]);
@@ -116,6 +152,16 @@ fn arms_clocks_and_readouts_of_another_unit_are_told() {
     assert!(clock.contains("clock_offset_ms = 43300.0") && clock.contains("43.3 s"), "{clock}");
     let delay = camera(|camera| camera.shutter.delay_ms = -5000.0);
     assert!(delay.contains("shutter.delay_ms"), "{delay}");
+    let turned = camera(|camera| camera.mount.angles_deg = [0.0, -1.571, 0.1]);
+    assert!(
+        turned.contains("mount.angles_deg = [0.0, -1.571, 0.1]") && turned.contains("[0, -90.01, 5.73]"),
+        "{turned}"
+    );
+    let tilted = camera(|camera| camera.mount.angles_deg = [0.785, 0.0, 0.0]);
+    assert!(tilted.contains("[44.98, 0, 0]"), "{tilted}");
+    assert_eq!(camera(|camera| camera.mount.angles_deg = [0.8, -1.5, 0.3]), "");
+    let fast = camera(|camera| camera.fps = 33_333_333.0);
+    assert!(fast.contains("fps = 33333333.0 is more than any usual camera"), "{fast}");
     let short = camera(|camera| camera.shutter.readout_ms = 0.033);
     assert!(short.contains("shutter.readout_ms = 0.033 ms is shorter"), "{short}");
     let long = camera(|camera| camera.shutter.readout_ms = 330.0);

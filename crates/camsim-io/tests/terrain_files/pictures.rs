@@ -91,6 +91,36 @@ fn read_ortho(tiff: Tiff, edit: impl FnOnce(&mut TerrainSpec)) -> Result<([u8; 3
     read(&spec).map(|loaded| (color(&loaded, [1, 1]), loaded.notes)).map_err(|error| error.to_string())
 }
 
+#[test]
+fn descriptions_against_the_colours_of_rgb_are_named() {
+    for (names, note) in [
+        (
+            ["NIR", "Red", "Green"],
+            Some("RGB by its photometric interpretation, but its bands are described as NIR"),
+        ),
+        (["Coastal", "Blue", "Green"], Some("described as Coastal, Blue, Green: the first three are used")),
+        (["NIR1", "-", "-"], Some("described as NIR1")),
+        (["Blue", "Green", "Red"], Some("red, green and blue are taken from bands 3, 2, 1")),
+        (["Red", "Green", "Blue"], None),
+        (["first", "second", "third"], None),
+    ] {
+        let items: String = (names.iter().enumerate())
+            .map(|(band, name)| {
+                format!(r#"<Item name="DESCRIPTION" sample="{band}" role="description">{name}</Item>"#)
+            })
+            .collect();
+        let mut tiff = Tiff::pixels([4, 3], 3, 8, 1, 2, [200, 100, 50].repeat(12));
+        tiff.keys = vec![1024, 1, 1025, 1, 3072, 32632];
+        let (_, notes) =
+            read_ortho(tiff.with_metadata(format!("<GDALMetadata>{items}</GDALMetadata>").leak()), |_| {})
+                .unwrap();
+        match note {
+            Some(note) => assert!(notes.iter().any(|told| told.contains(note)), "{names:?}: {notes:?}"),
+            None => assert!(notes.is_empty(), "{names:?}: {notes:?}"),
+        }
+    }
+}
+
 /// A grey image of one 16-bit value.
 fn grey_16_bit(value: u16, photometric: u16) -> Tiff {
     let mut tiff = Tiff::pixels([4, 3], 1, 16, 1, photometric, value.to_le_bytes().repeat(12));

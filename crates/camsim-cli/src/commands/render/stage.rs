@@ -23,7 +23,7 @@ use super::{
 use crate::{
     backend,
     channel_sheet::write_channel_sheet,
-    commands::export::with_needs,
+    commands::export::{judge_lenses, with_needs},
     console::Console,
     failure::{FAILED, Failure, OrFail},
     frame_list::Shard,
@@ -75,6 +75,7 @@ impl<'e> Stage<'e> {
             with_needs(with_backend(with_outputs(scenario, args)?, args.backend)?, export, console)
         })?;
         let cameras = chosen_cameras(&rig, &args.camera)?;
+        judge_lenses(cameras.iter().map(|&camera| &rig.scenarios()[camera]), export)?;
         refuse_parts_of_videos(&rig, shard)?;
         let piped = piped_camera(args.pipe, &rig, &cameras)?;
         let is_quiet = console.is_quiet();

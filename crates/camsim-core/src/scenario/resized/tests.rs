@@ -256,6 +256,25 @@ fn rows_keep_the_time_from_one_to_the_next() {
 }
 
 #[test]
+fn how_much_later_the_rows_of_a_part_are_is_known() {
+    for readout in [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft] {
+        let shutter = ShutterSpec { readout, readout_ms: 24.0, delay_ms: 20.0, ..ShutterSpec::default() };
+        let full = CameraSpec { shutter, ..pinhole() };
+        let whole = Shutter::from_spec(&full.shutter, 30.0, full.size_px).unwrap();
+        for spec in [crop([0, 0, 320, 121]), crop([101, 300, 500, 80]), binning(3.0)] {
+            let (part, change) = resized(&full, spec);
+            let own = Shutter::from_spec(&part.shutter, 30.0, part.size_px).unwrap();
+            let time_s = |at: [u32; 2]| own.dt_pixel_s(at[0], at[1]);
+            for at in places(change.size_px) {
+                let there = change.calibrated_point(point(at));
+                let later_s = time_s(at) - whole.dt_pixel_s(there.x as u32, there.y as u32);
+                assert!((1e3 * later_s - part.made_of.rows_later_ms).abs() < 1e-9, "{readout:?} {at:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn fields_of_an_interlaced_part_keep_their_rows() {
     let shutter = ShutterSpec { interlace_ms: FieldOr::Field, ..ShutterSpec::default() };
     let full = CameraSpec { shutter, ..pinhole() };

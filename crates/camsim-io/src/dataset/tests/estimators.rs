@@ -219,6 +219,13 @@ fn a_stereo_rig_has_its_baseline() {
         let report = exported(&kitti, DatasetFormat::Kitti).unwrap();
         assert_eq!(report.notes.is_empty(), is_pair, "{:?}", report.notes);
         assert_eq!(kitti.out().join("sequences/01/calib.txt").is_file(), !is_pair);
+        if rig == swapped {
+            let page = text(&kitti.out().join("README.md"));
+            assert!(
+                page.contains("cam1 (left) in `image_0` and `image_2`, cam0 (right) in `image_1`"),
+                "{page}"
+            );
+        }
         let bytes = fs::read(sample.out().join("camsim.mcap")).unwrap();
         for (i, wanted) in offsets.into_iter().enumerate() {
             let topic = format!("/cam{i}/camera_info");
