@@ -60,6 +60,10 @@ impl TableLayout {
         };
         // The comment that is read in full.
         header_lines.prose.retain(|line| height_datum::of_comment(line).is_none());
+        // Names are no prose.
+        if let Some((misfit, _)) = &header_lines.misfit {
+            header_lines.prose.retain(|line| line.number != *misfit);
+        }
         statements::apply(&mut layout, table, &header_lines.prose, spec, notes);
         Ok(layout)
     }
@@ -84,7 +88,12 @@ impl TableLayout {
         let named = Self::from_header(&first, table, spec, &mut Vec::new());
         let agrees = |layout: &Self| named.as_ref().is_ok_and(|named| named.has_columns_of(layout));
         match detected.map(|format| Self::without_header(table, format, spec)) {
-            Ok(layout) if spec.format != LogFormat::Auto || agrees(&layout) => {
+            Ok(mut layout) if spec.format != LogFormat::Auto || agrees(&layout) => {
+                if let Some(named) = named.as_ref().ok().filter(|named| named.has_columns_of(&layout)) {
+                    layout.time.unit_ns = named.time.unit_ns;
+                    layout.position = named.position;
+                    layout.attitude = named.attitude;
+                }
                 push_warning(
                     notes,
                     format!(
