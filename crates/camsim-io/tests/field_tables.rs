@@ -517,7 +517,7 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
 /// Conventions other than those by which angles, heights and positions are read.
 #[test]
 fn conventions_beside_the_rows_are_named() {
-    let cases: [(&str, &[&str]); 18] = [
+    let cases: [(&str, &[&str]); 20] = [
         ("pitch positive nose down", &["pitch is read as positive with the nose up"]),
         ("roll positive right wing down", &[]),
         ("Euler order: XYZ", &["yaw, then pitch, then roll"]),
@@ -525,6 +525,8 @@ fn conventions_beside_the_rows_are_named() {
         ("Euler order: ZYX", &[]),
         ("rotation order: roll, pitch, yaw about fixed axes", &[]),
         ("longitude positive west", &["longitudes as positive east"]),
+        ("longitude: east positive, west negative", &[]),
+        ("pitch: nose up positive, nose down negative", &[]),
         ("south latitudes positive", &["latitudes are read as positive north"]),
         ("altitude is negative down", &["heights are read as positive up"]),
         ("altitude is positive down", &["heights are read as positive up"]),
@@ -624,6 +626,24 @@ fn conventions_of_trajectories_are_applied_or_named() {
             Gives(Flight { warnings: &["line 1 names 9 columns, but the rows have 8"], ..level }),
         ),
         (
+            "others before the attitude",
+            tum("# timestamp tx ty tz vx vy vz qx qy qz qw", plain, ""),
+            local(),
+            Gives(Flight { warnings: &["line 1 names 11 columns"], ..level }),
+        ),
+        (
+            "another order",
+            tum("# timestamp, x, y, z, qw, qx, qy, qz, frame_id", plain, ""),
+            local(),
+            Refused(&["9 columns, but the rows have 8"]),
+        ),
+        (
+            "more numbers than names",
+            tum("# timestamp tx ty tz qx qy qz qw", plain, " 1 2 3"),
+            local(),
+            Gives(Flight { warnings: &["line 1 names 8 columns, but the rows have 11"], ..level }),
+        ),
+        (
             "others between them, with the format",
             tum("# t tx ty tz vx vy vz qx qy qz qw", plain, ""),
             read_as_tum(),
@@ -631,7 +651,7 @@ fn conventions_of_trajectories_are_applied_or_named() {
         ),
         (
             "units in names of more columns",
-            cm("# t[s] tx[cm] ty[cm] tz[cm] qx qy qz qw valid"),
+            cm("# time[s] tx[cm] ty[cm] tz[cm] qx qy qz qw valid"),
             local(),
             Gives(Flight { warnings: &["line 1 names 9 columns"], ..level }),
         ),

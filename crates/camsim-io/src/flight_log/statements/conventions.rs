@@ -329,6 +329,10 @@ fn find(line: &str) -> Vec<Convention> {
         // `Magnetic declination: 3 deg (applied)`
         MagneticNorth => !contains(&["applied", "corrected", "removed"]),
         AboveGround => !is_height_of_other(&words),
+        // `nose up positive, nose down negative`
+        PitchDown | WestOrSouth if lower.contains(',') => {
+            lower.split(',').any(|clause| find(clause).contains(convention))
+        }
         EulerOrder => !has_order_read(&plain),
         _ => true,
     });

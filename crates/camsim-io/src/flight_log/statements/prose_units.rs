@@ -78,7 +78,6 @@ const FILLERS: &[&str] = &[
     "gps",
     "gnss",
     "above",
-    "mean",
     "sea",
     "level",
     "msl",
@@ -124,9 +123,6 @@ const FILLERS: &[&str] = &[
     "enu",
     "frd",
     "flu",
-    "right",
-    "left",
-    "handed",
     "axis",
     "axes",
     "up",
@@ -135,9 +131,41 @@ const FILLERS: &[&str] = &[
     "per",
     "/",
 ];
+/// Such words that make another quantity of one right behind them, as in `frame height` and `start time`.
+const MODIFIERS: &[&str] = &[
+    "column",
+    "row",
+    "field",
+    "table",
+    "file",
+    "frame",
+    "scale",
+    "pose",
+    "trajectory",
+    "level",
+    "geoid",
+    "boot",
+    "start",
+    "startup",
+    "epoch",
+    "first",
+    "last",
+    "axis",
+    "axes",
+    "scalar",
+    "number",
+    "value",
+];
 /// Pairs of words one of which alone has another meaning.
-const FILLER_PAIRS: &[[&str; 2]] =
-    &[["ground", "truth"], ["camera", "pose"], ["camera", "poses"], ["camera", "trajectory"]];
+const FILLER_PAIRS: &[[&str; 2]] = &[
+    ["ground", "truth"],
+    ["camera", "pose"],
+    ["camera", "poses"],
+    ["camera", "trajectory"],
+    ["mean", "sea"],
+    ["right", "handed"],
+    ["left", "handed"],
+];
 /// Words by which a unit without a quantity is that of the whole table.
 const WHOLE_TABLE: &[&str] = &["unit", "units", "values", "pose", "poses"];
 /// Words behind which a unit stands.
@@ -376,13 +404,16 @@ fn has_other_words(words: &[Word<'_>], frame: Frame) -> bool {
     let mut next = 0;
     let mut has_words = false;
     while let Some(word) = words.get(next) {
-        let pair = [word.text, words.get(next + 1).map_or("", |word| word.text)];
+        let following = words.get(next + 1);
+        let pair = [word.text, following.map_or("", |word| word.text)];
+        let is_modifier = MODIFIERS.contains(&word.text)
+            && following.is_some_and(|word| word.is_adjacent && quantity(word.text, frame).is_some());
         let count = if FILLER_PAIRS.contains(&pair) {
             2
         } else if let Some((_, count)) = unit_at(words, next) {
             count
         } else if quantity(word.text, frame).is_some()
-            || FILLERS.contains(&word.text)
+            || (FILLERS.contains(&word.text) && !is_modifier)
             || OTHER_UNITS.contains(&word.text)
             // `4: altitude`, `column 4`, `5-7: angles`.
             || (is_number(word.text) && (!has_words || words[next - 1].text.starts_with("col")))
@@ -570,6 +601,9 @@ mod tests {
             ("altitude in feet of terrain", "ft"),
             ("Image height in mm: 24", "mm"),
             ("Wingspan and height (ft)", "ft"),
+            ("frame roll in mrad", "mrad"),
+            ("mean height in mm", "mm"),
+            ("start time in ms", "ms"),
             ("obstacle heights in feet", "ft"),
             ("IMU roll/pitch bias [mrad]", "mrad"),
             ("time between photos in s", "s"),
