@@ -302,6 +302,15 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
             applied(&["line 2"]),
         ),
         (
+            "no unit of a quality",
+            flight(
+                &format!("{} Q\n(s) (deg) (deg) (ft) (deg) (deg) (deg)", names.replace(',', " ")),
+                &(feet.replace("{rpy}", "5 2 60").replace(',', " ") + " 1"),
+            ),
+            spec(),
+            applied(&["line 2 states the units"]),
+        ),
+        (
             "unknown unit",
             flight(&format!("{names}\ns,deg,deg,kft,deg,deg,deg"), feet),
             spec(),
@@ -404,7 +413,7 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
             "everything",
             flight(&format!("# everything in feet\n{names}"), feet),
             spec(),
-            unread(&["not plainly which column is in ft"]),
+            unread(&["line 1 says `everything in feet`, but it is not plainly about a column"]),
         ),
         (
             "imperial",
@@ -423,6 +432,12 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
             flight("# altitude in feet\ntime,lat,lon,alt_m,roll,pitch,yaw", metres),
             spec(),
             named(&["`alt_m` has another unit"]),
+        ),
+        (
+            "a unit of something else beside a unit in the name",
+            flight("# Altitude ceiling (ft): 400\ntime,lat,lon,alt_m,roll,pitch,yaw", metres),
+            spec(),
+            named(&["the unit of `alt_m` is known by its name"]),
         ),
         (
             "values",
@@ -499,6 +514,68 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
     );
 }
 
+/// Conventions other than those by which angles, heights and positions are read.
+#[test]
+fn conventions_beside_the_rows_are_named() {
+    let cases: [(&str, &[&str]); 20] = [
+        ("pitch positive nose down", &["pitch is read as positive with the nose up"]),
+        ("roll positive right wing down", &[]),
+        ("Euler order: XYZ", &["yaw, then pitch, then roll"]),
+        ("rotation order: roll first", &["yaw, then pitch, then roll"]),
+        ("Euler order: ZYX", &[]),
+        ("rotation order: roll, pitch, yaw about fixed axes", &[]),
+        ("longitude positive west", &["longitudes as positive east"]),
+        ("longitude: east positive, west negative", &[]),
+        ("pitch: nose up positive, nose down negative", &[]),
+        ("south latitudes positive", &["latitudes are read as positive north"]),
+        ("altitude is negative down", &["heights are read as positive up"]),
+        ("altitude is positive down", &["heights are read as positive up"]),
+        ("positions of the camera, not the body", &["those of the body: camera.mount"]),
+        ("Magnetic declination: 3.0 deg (applied)", &[]),
+        ("Magnetic declination: 3.0 deg", &["add the declination"]),
+        ("home altitude above ground 2 m", &[]),
+        ("Sensor height: 1.5 m above ground", &[]),
+        ("heights above ground, which is at 480 m", &["add the height of the ground"]),
+        ("logger WGS72 firmware", &[]),
+        ("Datum: WGS72", &["positions are taken as WGS 84"]),
+    ];
+    check_all(cases.map(|(line, warnings)| {
+        let head = format!("# {line}\ntime,lat,lon,alt,roll,pitch,yaw");
+        let text = flight(&head, "{t},{lat},{lon},{h},{rpy}");
+        (line.to_owned(), read_bytes(text.as_bytes(), &spec()), Gives(Flight { warnings, ..USUAL }))
+    }));
+}
+
+/// A unit that may be that of something else than a column does not change the numbers.
+#[test]
+fn units_of_other_things_are_named_and_not_applied() {
+    let lines = [
+        "# Image height in mm: 24",
+        "# marker height in mm: 80",
+        "RTH Altitude (ft): 400",
+        "# Altitude ceiling (ft)",
+        "# geofence height in feet",
+        "# DEM height unit: ft",
+        "# obstacle heights in feet",
+        "# Wingspan and height (ft): 36, 8",
+        "# Dist and height units: ft",
+        "# Cloud base altitude in feet",
+        "# altitude in feet of terrain",
+        "# boresight roll in mrad: 3",
+        "# IMU roll/pitch bias [mrad]: 1 2",
+        "# time between photos in ms: 2000",
+        "# timestamps of video in ms",
+        "# Video time unit: ms",
+        "# col 4: ft",
+        "# distances in feet",
+    ];
+    check_all(lines.map(|line| {
+        let text = flight(&format!("{line}\ntime,lat,lon,alt,roll,pitch,yaw"), "{t},{lat},{lon},{h},{rpy}");
+        let warnings = &["line 1 says"];
+        (line.to_owned(), read_bytes(text.as_bytes(), &spec()), Gives(Flight { warnings, ..USUAL }))
+    }));
+}
+
 /// A level flight north at heading 60, as a quaternion of a forward-left-up body in east, north, up: 30 degrees
 /// to the left of east.
 const NORTH_EAST: [&str; 4] = ["0", "0", "0.258819045", "0.965925826"];
@@ -506,6 +583,12 @@ const NORTH_EAST: [&str; 4] = ["0", "0", "0.258819045", "0.965925826"];
 fn tum(head: &str, order: [usize; 4], extra: &str) -> String {
     let quaternion = order.map(|index| NORTH_EAST[index]).join(" ");
     flight(head, &format!("{{t}} {{n}} 0 {{up}} {quaternion}{extra}")).trim_start().to_owned()
+}
+
+/// The same flight in centimetres.
+fn cm(head: &str) -> String {
+    let row = "{t} {n}e2 0 {up}e2 ".to_owned() + &NORTH_EAST.join(" ");
+    flight(head, &row)
 }
 
 #[test]
@@ -535,6 +618,42 @@ fn conventions_of_trajectories_are_applied_or_named() {
             tum("# t tx ty tz qx qy qz", plain, ""),
             read_as_tum(),
             Gives(Flight { warnings: &["line 1 names 7 columns"], ..level }),
+        ),
+        (
+            "a label and names of more columns",
+            tum("# format: timestamp tx ty tz qx qy qz qw valid", plain, ""),
+            local(),
+            Gives(Flight { warnings: &["line 1 names 9 columns, but the rows have 8"], ..level }),
+        ),
+        (
+            "others before the attitude",
+            tum("# timestamp tx ty tz vx vy vz qx qy qz qw", plain, ""),
+            local(),
+            Gives(Flight { warnings: &["line 1 names 11 columns"], ..level }),
+        ),
+        (
+            "another order",
+            tum("# timestamp, x, y, z, qw, qx, qy, qz, frame_id", plain, ""),
+            local(),
+            Refused(&["9 columns, but the rows have 8"]),
+        ),
+        (
+            "more numbers than names",
+            tum("# timestamp tx ty tz qx qy qz qw", plain, " 1 2 3"),
+            local(),
+            Gives(Flight { warnings: &["line 1 names 8 columns, but the rows have 11"], ..level }),
+        ),
+        (
+            "others between them, with the format",
+            tum("# t tx ty tz vx vy vz qx qy qz qw", plain, ""),
+            read_as_tum(),
+            Gives(Flight { warnings: &["line 1 names 11 columns"], ..level }),
+        ),
+        (
+            "units in names of more columns",
+            cm("# time[s] tx[cm] ty[cm] tz[cm] qx qy qz qw valid"),
+            local(),
+            Gives(Flight { warnings: &["line 1 names 9 columns"], ..level }),
         ),
         (
             "names of others",
@@ -573,12 +692,40 @@ fn conventions_of_trajectories_are_applied_or_named() {
             local(),
             Gives(Flight { warnings: &["x east, y north, z up"], ..level }),
         ),
+        (
+            "axes in as many words as columns",
+            tum("# world frame: NED (x north, y east, z down)\n# timestamp tx ty tz qx qy qz qw", plain, ""),
+            local(),
+            Gives(Flight { warnings: &["positions are read as x east"], ..level }),
+        ),
+        (
+            "JPL",
+            tum("# quaternions in JPL convention", plain, ""),
+            local(),
+            Gives(Flight { warnings: &["read as Hamilton's"], ..level }),
+        ),
         ("agreeing axes", tum("# world ENU, body FLU, z up", plain, ""), local(), Gives(level)),
         (
             "poses of the world",
             tum("# T_cw: world to camera", plain, ""),
             local(),
             Gives(Flight { warnings: &["invert them"], ..level }),
+        ),
+        (
+            "units of all",
+            cm("# all values in cm and s"),
+            local(),
+            Gives(Flight { notes: &["line 1 states the unit of `x`, `y`, `z`: cm"], ..level }),
+        ),
+        ("unit of poses", cm("# pose in cm"), local(), Gives(level)),
+        ("unit of ground truth", cm("# ground truth, unit: cm"), local(), Gives(level)),
+        ("scale of one", cm("# scale: 1 unit = 1 cm"), local(), Gives(level)),
+        ("nothing but a unit", cm("# [cm]"), local(), Gives(level)),
+        (
+            "another scale",
+            tum("# 1 unit = 0.01 m", plain, ""),
+            local(),
+            Gives(Flight { warnings: &["line 1 says `1 unit = 0.01 m`"], ..level }),
         ),
         ("velocities", tum("# velocity in NED", plain, ""), local(), Gives(level)),
         ("some without", tum("", plain, "") + "6.0 60 0 6 0 0 0 0\n", local(), Gives(level)),

@@ -105,7 +105,7 @@ impl<'a> HeaderLines<'a> {
             push_warning(notes, format!("line {}: {problem}; flight.format counts", line.number));
         }
         let misfit = table.headers.iter().rev().find_map(|line| {
-            let names = table.names(line.text);
+            let names = without_words_before(table.names(line.text));
             has_time_and_position(&HeaderColumns::parse(&names)).then_some((line.number, names))
         });
         Ok(Self { names: None, misfit, prose: table.headers.clone() })
@@ -203,10 +203,21 @@ fn header_after_prose(table: &Table<'_>, text: &str) -> Option<HeaderColumns> {
     })
 }
 
+/// Names without a label before them, as `format:` is.
+fn without_words_before(mut names: Vec<&str>) -> Vec<&str> {
+    let is_label = |name: &&str| name.ends_with([':', '=']);
+    if let Some(label) = names.iter().rposition(is_label) {
+        names.drain(..=label);
+    }
+    names
+}
+
 /// The cells of a line of units above or below the names; `None` if it is none. Cells may be empty, and those
 /// of columns that are not read may hold any word.
 fn unit_cells<'a>(header: &HeaderColumns, table: &Table<'a>, text: &'a str) -> Option<Vec<&'a str>> {
-    let cells = table.cells(without_label(text), header.0.len())?;
+    let text = without_label(text);
+    let cells =
+        table.cells(text, header.0.len()).or_else(|| cells_of_columns_with_units(header, table, text))?;
     let (mut units, mut others) = (0, 0);
     for (column, cell) in cells.iter().enumerate().filter(|(_, cell)| !is_missing(cell)) {
         let bare = cell.trim_matches(['[', ']', '(', ')', '"', ' ']);
@@ -224,6 +235,32 @@ fn unit_cells<'a>(header: &HeaderColumns, table: &Table<'a>, text: &'a str) -> O
         }
     }
     (units > others).then_some(cells)
+}
+
+/// The cells of a line that leaves out the columns without a unit, as those of quality.
+fn cells_of_columns_with_units<'a>(
+    header: &HeaderColumns,
+    table: &Table<'a>,
+    text: &'a str,
+) -> Option<Vec<&'a str>> {
+    let has_unit =
+        |column: usize| header.parsed(column).is_some_and(|parsed| dimension(parsed.meaning).is_some());
+    let columns: Vec<usize> = (0..header.0.len()).filter(|&column| has_unit(column)).collect();
+    let units = table.cells(text, columns.len())?;
+    let mut cells = vec![""; header.0.len()];
+    for (column, unit) in columns.into_iter().zip(units) {
+        let wanted = header.parsed(column).and_then(|parsed| dimension(parsed.meaning));
+        let bare = unit.trim_matches(['[', ']', '(', ')', '"', ' ']);
+        let found = parse_qualifiers(bare)?.into_iter().find_map(|qualifier| match qualifier {
+            Qualifier::Unit(unit) => Some(unit.dimension),
+            _ => None,
+        });
+        if found != wanted {
+            return None;
+        }
+        cells[column] = unit;
+    }
+    Some(cells)
 }
 
 /// A line without a label such as `units:` or `Unit,` before the cells.
@@ -252,6 +289,14 @@ fn add_units(header: &mut HeaderColumns, cells: &[&str]) {
 /// The columns of a line above or below the names that names as many, most of them known.
 fn second_names(header: &HeaderColumns, table: &Table<'_>, line: &HeaderLine<'_>) -> Option<HeaderColumns> {
     let second = HeaderColumns::parse(&table.names(line.text));
+    let agreeing = |(ours, theirs): &(&HeaderColumn, &HeaderColumn)| match (&ours.parsed, &theirs.parsed) {
+        (Some(ours), Some(theirs)) => merged(ours, theirs).is_some(),
+        _ => false,
+    };
+    // `world frame: NED (x north, y east, z down)` has as many words as columns.
+    if line.is_comment && header.0.iter().zip(&second.0).filter(agreeing).count() * 2 < known_names(&second) {
+        return None;
+    }
     let is_header = second.0.len() == header.0.len()
         && known_names(&second) >= MIN_KNOWN_NAMES
         && known_names(&second) * 2 >= known_names(header);

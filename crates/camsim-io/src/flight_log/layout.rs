@@ -12,7 +12,7 @@ use super::{
     attitude_columns::attitude_columns,
     column_meaning::{ColumnMeaning, FixCode},
     column_selection::{note_unused_columns, position_columns, push_warning, time_columns},
-    columns::{AttitudeColumns, FieldSource, Frame, TimeColumns},
+    columns::{AttitudeColumns, AttitudeKind, FieldSource, Frame, TimeColumns},
     detect,
     header::HeaderColumns,
     header_lines::{HeaderLines, width_message},
@@ -60,6 +60,10 @@ impl TableLayout {
         };
         // The comment that is read in full.
         header_lines.prose.retain(|line| height_datum::of_comment(line).is_none());
+        // Names are no prose.
+        if let Some((misfit, _)) = &header_lines.misfit {
+            header_lines.prose.retain(|line| line.number != *misfit);
+        }
         statements::apply(&mut layout, table, &header_lines.prose, spec, notes);
         Ok(layout)
     }
@@ -80,11 +84,22 @@ impl TableLayout {
         let Some((line, names)) = misfit else {
             return Ok(Self::without_header(table, detected?, spec));
         };
-        let first = HeaderColumns::parse(names.get(..table.columns).unwrap_or(&[]));
+        let first = HeaderColumns::parse(names.get(..table.columns).unwrap_or(names));
         let named = Self::from_header(&first, table, spec, &mut Vec::new());
-        let agrees = |layout: &Self| named.as_ref().is_ok_and(|named| named.has_columns_of(layout));
+        // Names of other columns before those of the attitude leave the attitude to the values.
+        let track = FlightSpec { attitude: AttitudeSource::Track, ..spec.clone() };
+        let path_named = Self::from_header(&first, table, &track, &mut Vec::new());
+        let agrees = |layout: &Self| match &named {
+            Ok(named) if named.attitude.kind() != AttitudeKind::None => named.has_columns_of(layout),
+            _ => path_named.as_ref().is_ok_and(|named| named.has_path_columns_of(layout)),
+        };
         match detected.map(|format| Self::without_header(table, format, spec)) {
-            Ok(layout) if spec.format != LogFormat::Auto || agrees(&layout) => {
+            Ok(mut layout) if spec.format != LogFormat::Auto || agrees(&layout) => {
+                if let Some(named) = named.as_ref().ok().filter(|named| named.has_columns_of(&layout)) {
+                    layout.time.unit_ns = named.time.unit_ns;
+                    layout.position = named.position;
+                    layout.attitude = named.attitude;
+                }
                 push_warning(
                     notes,
                     format!(
@@ -106,10 +121,13 @@ impl TableLayout {
 
     /// Whether time, position and attitude are in the same columns as those of another layout.
     fn has_columns_of(&self, other: &Self) -> bool {
+        self.has_path_columns_of(other) && self.attitude.columns() == other.attitude.columns()
+    }
+
+    /// Whether time and position are in the same columns as those of another layout.
+    fn has_path_columns_of(&self, other: &Self) -> bool {
         let columns = |layout: &Self| (layout.time.column, layout.position.map(|source| source.column));
-        self.frame == other.frame
-            && columns(self) == columns(other)
-            && self.attitude.columns() == other.attitude.columns()
+        self.frame == other.frame && columns(self) == columns(other)
     }
 
     fn without_header(table: &Table<'_>, format: LogFormat, spec: &FlightSpec) -> Self {

@@ -107,11 +107,12 @@ const RULES: &[(&str, &str)] = &[
     ),
     (
         "Prose",
-        "comments above, among and below the rows, and lines before the names. A unit that plainly belongs to a \
+        "comments above, among and below the rows, and lines before the names. In a line about columns \
+            and nothing else, without unknown words or numbers, a unit that plainly belongs to a \
             quantity (`# heights in feet`, `Altitude unit,feet`, `# units: radians`) is applied where the header \
             names none, and so is the order of quaternions without names (`# scalar first`). Other statements \
-            about what is read that differ from how it is read (units in doubt, datums, axes, magnetic north) \
-            give one warning",
+            about what is read that differ from how it is read (units in doubt, datums, axes, \
+            signs and order of angles, magnetic north) give one warning",
     ),
     (
         "Tags (FlySight 2)",
@@ -134,7 +135,8 @@ const RULES: &[(&str, &str)] = &[
         "Number of columns",
         "a header names as many as the rows have, and no row has more. The end of a comment counts where \
             prose stands before the names (`# format: timestamp tx ty ...`). A comment that names another number \
-            gives a warning where flight.format or the values tell the layout",
+            gives a warning where flight.format tells the layout, or the values do and the names of time and \
+            position do not contradict them",
     ),
     (
         "Times",

@@ -54,6 +54,7 @@ pub(super) fn apply(
     if doubts.is_empty() {
         return;
     }
+    doubts.dedup_by(|one, other| one.line == other.line && one.reason == other.reason);
     let more = doubts.len().saturating_sub(MAX_QUOTED);
     let quoted: Vec<String> = doubts.iter().take(MAX_QUOTED).map(Doubt::describe).collect();
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
@@ -99,7 +100,7 @@ fn apply_units(
             stated.extend(targets.into_iter().map(|target| (target, unit, *line)));
         }
         if let Some(unit) = found.doubtful {
-            doubts.push(Doubt::new(line, in_doubt(unit, layout)));
+            doubts.push(Doubt::new(line, in_doubt(unit, layout, spec)));
         }
     }
     let mut applied: Vec<(usize, &'static Unit, Vec<String>)> = Vec::new();
@@ -196,14 +197,21 @@ fn set_unit(layout: &mut TableLayout, target: Target, factor: f64) {
 }
 
 /// How numbers are read whose unit prose states unclearly.
-fn in_doubt(unit: &Unit, layout: &TableLayout) -> String {
-    let name = |column: usize| layout.names.get(column).cloned().unwrap_or_default();
-    let example = match unit.dimension {
-        Dimension::Time => format!("{}_ms", name(layout.time.column)),
-        Dimension::Length => format!("{}_ft", name(layout.position[2].column)),
-        Dimension::Angle => "yaw_rad".to_owned(),
+fn in_doubt(unit: &Unit, layout: &TableLayout, spec: &FlightSpec) -> String {
+    let target = match unit.dimension {
+        Dimension::Time => Target::Time,
+        Dimension::Length => Target::Position(2),
+        Dimension::Angle => Target::Angle(2),
     };
-    format!("not plainly which column is in {}: name units in the header, as `{example}`", unit.name)
+    let name = column_of(layout, target).and_then(|column| layout.names.get(column));
+    let name = name.map_or("yaw", |name| name.as_str());
+    if unit_of(layout, spec, target).is_some() {
+        return format!("the unit of `{name}` is known by its name or by [flight], which counts");
+    }
+    format!(
+        "it is not plainly about a column: write the unit in the column's name, as `{name} ({})`, if it is",
+        unit.name
+    )
 }
 
 /// The meaning of a column by its name.

@@ -43,6 +43,12 @@ enum Convention {
     XNorth,
     XEast,
     Imperial,
+    Jpl,
+    PitchDown,
+    HeightDown,
+    WestOrSouth,
+    EulerOrder,
+    OtherPoint,
 }
 
 use Convention::*;
@@ -157,6 +163,101 @@ const PHRASES: &[(Convention, &[&str])] = &[
     (XNorth, &["x north"]),
     (XEast, &["x east"]),
     (Imperial, &["imperial", "us customary"]),
+    (Jpl, &["jpl", "shuster"]),
+    (
+        PitchDown,
+        &[
+            "positive nose down",
+            "nose down positive",
+            "nose down is positive",
+            "negative nose up",
+            "nose up negative",
+            "pitch positive down",
+            "pitch positive downward",
+            "pitch positive downwards",
+            "positive pitch down",
+            "positive pitch nose down",
+        ],
+    ),
+    (
+        HeightDown,
+        &[
+            "altitude positive down",
+            "altitude negative down",
+            "altitude negative up",
+            "altitude positive downward",
+            "altitude positive downwards",
+            "altitudes positive down",
+            "altitudes negative down",
+            "alt positive down",
+            "alt negative down",
+            "alt negative up",
+            "height positive down",
+            "height negative down",
+            "height negative up",
+            "heights positive down",
+            "heights negative down",
+            "heights negative up",
+            "positive down altitude",
+            "positive down height",
+        ],
+    ),
+    (
+        WestOrSouth,
+        &[
+            "positive west",
+            "positive westward",
+            "positive westwards",
+            "west positive",
+            "west longitude positive",
+            "west longitudes positive",
+            "negative east",
+            "east negative",
+            "positive south",
+            "positive southward",
+            "positive southwards",
+            "south positive",
+            "south latitude positive",
+            "south latitudes positive",
+            "negative north",
+            "north negative",
+        ],
+    ),
+    (
+        EulerOrder,
+        &[
+            "euler order",
+            "euler sequence",
+            "euler convention",
+            "rotation order",
+            "rotation sequence",
+            "order of rotation",
+            "order of rotations",
+            "order of angles",
+            "angle order",
+            "angles order",
+            "euler xyz",
+            "euler angles xyz",
+            "xyz euler",
+            "roll first",
+        ],
+    ),
+    (
+        OtherPoint,
+        &[
+            "position of camera",
+            "positions of camera",
+            "camera position",
+            "camera positions",
+            "position of antenna",
+            "positions of antenna",
+            "antenna position",
+            "antenna positions",
+            "position of antenna phase center",
+            "position of lidar",
+            "positions of lidar",
+        ],
+    ),
 ];
 
 /// Applies the order of quaternions. Returns the statements that differ from how the table is read.
@@ -185,15 +286,16 @@ pub(super) fn apply(
 
 /// The conventions that a line names.
 fn find(line: &str) -> Vec<Convention> {
-    const FILLERS: [&str; 11] =
-        ["is", "are", "axis", "axes", "points", "pointing", "to", "positive", "towards", "the", "as"];
+    const FILLERS: [&str; 10] =
+        ["is", "are", "axis", "axes", "points", "pointing", "to", "towards", "the", "as"];
     let lower = line.to_lowercase();
     let words: Vec<&str> =
         lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let joined = |words: &[&str]| format!(" {} ", words.join(" "));
     let plain = joined(&words);
     let short: Vec<&str> = words.iter().copied().filter(|word| !FILLERS.contains(word)).collect();
-    let short = joined(&short);
+    let unsigned: Vec<&str> = short.iter().copied().filter(|word| *word != "positive").collect();
+    let (short, unsigned) = (joined(&short), joined(&unsigned));
     // `velocity in ENU` does not concern positions.
     let is_of_motion = ["velocity", "velocities", "vel", "speed", "acceleration", "accelerations", "gyro"]
         .iter()
@@ -218,12 +320,23 @@ fn find(line: &str) -> Vec<Convention> {
     }
     let has = |phrase: &&str| {
         let phrase = format!(" {phrase} ");
-        plain.contains(&phrase) || short.contains(&phrase)
+        plain.contains(&phrase) || short.contains(&phrase) || unsigned.contains(&phrase)
     };
     let named = PHRASES.iter().filter(|(_, phrases)| phrases.iter().any(has));
     let mut found: Vec<Convention> = named.map(|(convention, _)| *convention).collect();
-    // An ellipsoid alone is a part of any geodetic datum; that of heights is a statement.
     let contains = |list: &[&str]| list.iter().any(|word| words.contains(word));
+    found.retain(|convention| match convention {
+        // `Magnetic declination: 3 deg (applied)`
+        MagneticNorth => !contains(&["applied", "corrected", "removed"]),
+        AboveGround => !is_height_of_other(&words),
+        // `nose up positive, nose down negative`
+        PitchDown | WestOrSouth if lower.contains(',') => {
+            lower.split(',').any(|clause| find(clause).contains(convention))
+        }
+        EulerOrder => !has_order_read(&plain),
+        _ => true,
+    });
+    // An ellipsoid alone is a part of any geodetic datum; that of heights is a statement.
     let is_vertical =
         contains(&["height", "heights", "altitude", "altitudes", "alt", "vertical", "elevation", "h"]);
     if is_vertical && contains(&["ellipsoid", "ellipsoidal"]) && !found.contains(&Ellipsoid) {
@@ -237,6 +350,29 @@ fn find(line: &str) -> Vec<Convention> {
         found.push(MeanSeaLevel);
     }
     found
+}
+
+/// Whether a line says how high something is, as in `Sensor height: 1.5 m above ground`.
+fn is_height_of_other(words: &[&str]) -> bool {
+    let is_number = |word: &&str| word.bytes().all(|byte| byte.is_ascii_digit());
+    let is_other = |word: &&str| {
+        ["home", "sensor", "camera", "antenna", "lidar", "takeoff", "launch", "base", "station"]
+            .contains(word)
+    };
+    words.iter().any(is_number)
+        && words
+            .windows(2)
+            .any(|pair| is_other(&pair[0]) && ["height", "altitude", "elevation", "alt"].contains(&pair[1]))
+}
+
+/// Whether a line names the order in which angles are read: yaw, pitch, roll about turned axes, which is roll,
+/// pitch, yaw about fixed ones.
+fn has_order_read(line: &str) -> bool {
+    let has = |phrases: &[&str]| phrases.iter().any(|phrase| line.contains(&format!(" {phrase} ")));
+    if has(&["extrinsic", "fixed", "static"]) {
+        return has(&["xyz", "x y z", "roll pitch yaw", "rpy"]);
+    }
+    has(&["zyx", "z y x", "yaw pitch roll", "ypr", "321", "3 2 1", "yaw first"])
 }
 
 /// Reads quaternions without names in the order that prose states.
@@ -338,6 +474,25 @@ fn difference(convention: Convention, layout: &TableLayout, spec: &FlightSpec) -
         XNorth => (layout.frame == Frame::EastNorthUp).then(|| format!("{axes}: {fix}")),
         XEast => matches!(layout.frame, Frame::NorthEastUp | Frame::NorthEastDown)
             .then(|| format!("{axes}: {fix}")),
+        Jpl => (kind == AttitudeKind::Quaternion).then(|| {
+            "quaternions are read as Hamilton's, which turn the body to the world: invert them if they turn the \
+                world to the body"
+                .to_owned()
+        }),
+        PitchDown => (kind == AttitudeKind::Euler)
+            .then(|| "pitch is read as positive with the nose up: change its sign if it is not".to_owned()),
+        HeightDown => (up == "up")
+            .then(|| "heights are read as positive up: change their sign if they are not".to_owned()),
+        WestOrSouth => is_geodetic.then(|| {
+            "latitudes are read as positive north and longitudes as positive east: change the sign".to_owned()
+        }),
+        EulerOrder => (kind == AttitudeKind::Euler).then(|| {
+            "angles are read as yaw, then pitch, then roll, about turned axes (ZYX): convert them if they are not"
+                .to_owned()
+        }),
+        OtherPoint => Some(
+            "positions are read as those of the body: camera.mount says where the camera is in it".to_owned(),
+        ),
         Imperial => layout.position[2]
             .factor
             .is_none()
@@ -362,6 +517,13 @@ fn other_datum(line: &HeaderLine<'_>, layout: &TableLayout) -> Option<Doubt> {
         words.iter().any(|word| word == **datum) || words.windows(2).any(|pair| pair.concat() == ***datum)
     };
     let datum = DATUMS.iter().find(is_named)?;
+    // `logger WGS72 firmware`: the name of a device.
+    let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
+    if has(&["FIRMWARE", "SOFTWARE", "HARDWARE", "SERIAL"])
+        && !has(&["DATUM", "COORDINATES", "POSITIONS", "CRS", "LATITUDE", "LONGITUDE", "LAT", "LON"])
+    {
+        return None;
+    }
     (layout.frame == Frame::Geodetic).then(|| {
         Doubt::new(line, format!("positions are taken as WGS 84: convert them if they are of {datum}"))
     })

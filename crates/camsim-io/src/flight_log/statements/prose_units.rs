@@ -1,4 +1,7 @@
 //! Units in prose, with the quantities that they belong to: `heights in feet, angles in radians`.
+//!
+//! Prose may be about anything: `Image height in mm: 24`. So a unit counts only in a line that is about columns
+//! and nothing else: it has no word that is not known here, and states no number.
 
 use super::{
     super::{
@@ -13,28 +16,158 @@ use super::{
 pub(super) struct Found {
     /// Units with what they belong to; with nothing, to the whole table.
     pub(super) plain: Vec<(Vec<Target>, &'static Unit)>,
-    /// A unit other than metres, degrees and seconds that may belong to what is read.
+    /// A unit other than metres and degrees that may belong to what is read.
     pub(super) doubtful: Option<&'static Unit>,
 }
 
-/// Words that make a sentence one about something else than how the table's numbers are.
-const HEDGES: &[&str] = &[
-    "not",
-    "no",
-    "never",
-    "converted",
-    "instead",
-    "was",
-    "were",
-    "formerly",
-    "originally",
-    "except",
-    "unless",
-    "if",
-    "or",
-    "might",
-    "should",
+/// Words that say nothing about which numbers have a unit.
+const FILLERS: &[&str] = &[
+    "unit",
+    "units",
+    "in",
+    "of",
+    "are",
+    "is",
+    "as",
+    "to",
+    "a",
+    "an",
+    "all",
+    "and",
+    "the",
+    "this",
+    "these",
+    "with",
+    "by",
+    "decimal",
+    "value",
+    "values",
+    "number",
+    "numbers",
+    "column",
+    "columns",
+    "col",
+    "cols",
+    "field",
+    "fields",
+    "row",
+    "rows",
+    "file",
+    "table",
+    "log",
+    "data",
+    "measured",
+    "given",
+    "recorded",
+    "logged",
+    "stored",
+    "expressed",
+    "written",
+    "stated",
+    "use",
+    "uses",
+    "using",
+    "format",
+    "scale",
+    "pose",
+    "poses",
+    "trajectory",
+    "flight",
+    "uav",
+    "drone",
+    "gps",
+    "gnss",
+    "above",
+    "sea",
+    "level",
+    "msl",
+    "amsl",
+    "asl",
+    "agl",
+    "orthometric",
+    "geoid",
+    "egm96",
+    "egm2008",
+    "navd88",
+    "ellipsoid",
+    "ellipsoidal",
+    "wgs84",
+    "wgs",
+    "84",
+    "since",
+    "from",
+    "boot",
+    "startup",
+    "start",
+    "epoch",
+    "unix",
+    "1970",
+    "utc",
+    "quaternion",
+    "quaternions",
+    "quat",
+    "hamilton",
+    "scalar",
+    "first",
+    "last",
+    "xyzw",
+    "wxyz",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+    "w",
+    "frame",
+    "convention",
+    "ned",
+    "enu",
+    "frd",
+    "flu",
+    "axis",
+    "axes",
+    "up",
+    "true",
+    "magnetic",
+    "per",
+    "/",
 ];
+/// Such words that make another quantity of one right behind them, as in `frame height` and `start time`.
+const MODIFIERS: &[&str] = &[
+    "column",
+    "row",
+    "field",
+    "table",
+    "file",
+    "frame",
+    "scale",
+    "pose",
+    "trajectory",
+    "level",
+    "geoid",
+    "boot",
+    "start",
+    "startup",
+    "epoch",
+    "first",
+    "last",
+    "axis",
+    "axes",
+    "scalar",
+    "number",
+    "value",
+];
+/// Pairs of words one of which alone has another meaning.
+const FILLER_PAIRS: &[[&str; 2]] = &[
+    ["ground", "truth"],
+    ["camera", "pose"],
+    ["camera", "poses"],
+    ["camera", "trajectory"],
+    ["mean", "sea"],
+    ["right", "handed"],
+    ["left", "handed"],
+];
+/// Words by which a unit without a quantity is that of the whole table.
+const WHOLE_TABLE: &[&str] = &["unit", "units", "values", "pose", "poses"];
 /// Words behind which a unit stands.
 const LINKS: &[&str] =
     &["in", "is", "are", "unit", "units", "as", "decimal", "and", "use", "uses", "using", "given"];
@@ -59,8 +192,6 @@ const OTHERS: &[&str] = &[
     "errors",
     "noise",
     "wind",
-    "distance",
-    "distances",
     "range",
     "acceleration",
     "accelerations",
@@ -119,17 +250,15 @@ const OTHERS: &[&str] = &[
     "maximum",
     "min",
     "minimum",
-    "mean",
     "average",
     "initial",
-    "start",
     "target",
     "cruise",
     "zone",
 ];
 /// Units of such quantities.
 const OTHER_UNITS: &[&str] =
-    &["knots", "knot", "kt", "kts", "kn", "mph", "kmh", "kph", "hpa", "mbar", "celsius"];
+    &["knots", "knot", "kt", "kts", "kn", "mph", "kmh", "kph", "hpa", "mbar", "celsius", "volts", "bpm"];
 
 /// One word of a line, or a slash between two.
 struct Word<'a> {
@@ -270,23 +399,73 @@ fn is_number(word: &str) -> bool {
     word.starts_with(|c: char| c.is_ascii_digit())
 }
 
+/// Whether a line has a word that is not known, or states a number.
+fn has_other_words(words: &[Word<'_>], frame: Frame) -> bool {
+    let mut next = 0;
+    let mut has_words = false;
+    while let Some(word) = words.get(next) {
+        let following = words.get(next + 1);
+        let pair = [word.text, following.map_or("", |word| word.text)];
+        let is_modifier = MODIFIERS.contains(&word.text)
+            && following.is_some_and(|word| word.is_adjacent && quantity(word.text, frame).is_some());
+        let count = if FILLER_PAIRS.contains(&pair) {
+            2
+        } else if let Some((_, count)) = unit_at(words, next) {
+            count
+        } else if quantity(word.text, frame).is_some()
+            || (FILLERS.contains(&word.text) && !is_modifier)
+            || OTHER_UNITS.contains(&word.text)
+            // `4: altitude`, `column 4`, `5-7: angles`.
+            || (is_number(word.text) && (!has_words || words[next - 1].text.starts_with("col")))
+        {
+            1
+        } else {
+            return true;
+        };
+        has_words |= !is_number(word.text);
+        next += count;
+    }
+    false
+}
+
+/// Leaves `unit = cm` of `1 unit = 1 cm`.
+fn remove_ones(words: &mut Vec<Word<'_>>) {
+    let mut is_marked = false;
+    words.retain_mut(|word| {
+        word.is_marked |= std::mem::take(&mut is_marked);
+        is_marked = word.text == "1" && word.is_marked;
+        word.text != "1"
+    });
+}
+
 /// Finds the units of a line.
 // Long because a word's meaning depends on those beside it.
 pub(super) fn find(line: &str, frame: Frame) -> Found {
     let lower = line.to_lowercase();
-    let words = words(&lower);
+    let mut words = words(&lower);
+    let states_scale = words.windows(2).any(|pair| pair[0].text == "1" && pair[1].text == "unit");
+    if states_scale {
+        remove_ones(&mut words);
+    }
     let text = |index: usize| words.get(index).map_or("", |word| word.text);
-    let is_hedged = words.iter().any(|word| HEDGES.contains(&word.text));
-    let states_units = words.iter().any(|word| matches!(word.text, "unit" | "units"));
+    let has_other_words = has_other_words(&words, frame);
+    let states_units = words.iter().any(|word| WHOLE_TABLE.contains(&word.text))
+        // `[mm]`
+        || (words.len() == 1 && words[0].is_marked);
     let mut found = Found::default();
     let mut pending: Vec<Quantity> = Vec::new();
     let mut next = 0;
+    // Where the last unit ends.
+    let mut unit_end = usize::MAX;
     while let Some(word) = words.get(next) {
         let index = next;
         let before = index.checked_sub(1).map_or("", text);
         next += 1;
         if word.begins_sentence {
             pending.clear();
+        }
+        if FILLER_PAIRS.contains(&[word.text, text(next)]) {
+            continue;
         }
         if let Some(quantity) = quantity(word.text, frame) {
             let is_qualified = word.is_adjacent && OTHERS.contains(&before);
@@ -301,11 +480,23 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
         }
         let Some((unit, count)) = unit_at(&words, index) else { continue };
         next += count - 1;
-        let is_plain_word =
-            count > 1 || word.is_marked || matches!(before, "in" | "unit" | "units") || !is_short(word.text);
-        if !is_plain_word || (count == 1 && is_number(before)) {
+        // `flown at 400 feet`, but not `1 unit = 0.01 m`.
+        if count == 1 && is_number(before) && !word.is_marked {
+            if states_scale {
+                found.doubtful = Some(unit);
+            }
             continue;
         }
+        let follows_unit = unit_end == index || (unit_end.checked_add(1) == Some(index) && before == "and");
+        let is_plain_word = count > 1
+            || word.is_marked
+            || follows_unit
+            || matches!(before, "in" | "unit" | "units")
+            || !is_short(word.text);
+        if !is_plain_word {
+            continue;
+        }
+        unit_end = next;
         // Feet per minute, m/s: the unit of another quantity.
         let has_other_dimension =
             |word: &str| self::unit(word).is_some_and(|other| other.dimension != unit.dimension);
@@ -318,6 +509,7 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
             continue;
         }
         let is_linked = word.is_marked
+            || follows_unit
             || LINKS.contains(&before)
             || quantity(before, frame).is_some()
             || self::unit(before).is_some();
@@ -338,9 +530,13 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
         if targets.is_empty() && had_others {
             continue;
         }
-        if is_linked && !is_hedged && (!targets.is_empty() || states_units) {
+        // `altitude in feet of terrain`
+        let is_of_other = had_others || (text(next) == "of" && OTHERS.contains(&text(next + 1)));
+        let is_plain = is_linked && !has_other_words && !is_of_other;
+        if is_plain && (!targets.is_empty() || states_units) {
             found.plain.push((targets, unit));
-        } else if unit.factor != 1.0 && unit.factor != 1e9 {
+        } else if unit.factor != 1.0 && (unit.dimension != Dimension::Time || !targets.is_empty()) {
+            // Metres and degrees are what is read without a unit; seconds need not be.
             found.doubtful = Some(unit);
         }
     }
@@ -370,6 +566,11 @@ mod tests {
             ("speed in knots, altitude in feet", vec![(height(), "ft")]),
             ("roll, pitch and yaw are in radians", vec![(angles(), "rad")]),
             ("attitude angles in radians; time in ms", vec![(angles(), "rad"), (vec![Time], "ms")]),
+            ("1 unit = 1 cm", vec![(vec![], "cm")]),
+            ("[mm]", vec![(vec![], "mm")]),
+            ("all values in mm and s", vec![(vec![], "mm"), (vec![], "s")]),
+            ("ground truth, unit: cm", vec![(vec![], "cm")]),
+            ("4: altitude (ft)", vec![(height(), "ft")]),
             ("lat/lon in 1e-7 degrees", vec![(vec![Position(0), Position(1)], "1e-7 deg")]),
             ("height in US survey feet", vec![(height(), "US survey foot")]),
             ("Length Units,Millimeters", vec![(height(), "mm")]),
@@ -397,6 +598,18 @@ mod tests {
             ("altitude converted from feet to metres", "ft"),
             ("heights are not in feet", "ft"),
             ("everything in radians", "rad"),
+            ("altitude in feet of terrain", "ft"),
+            ("Image height in mm: 24", "mm"),
+            ("Wingspan and height (ft)", "ft"),
+            ("frame roll in mrad", "mrad"),
+            ("mean height in mm", "mm"),
+            ("start time in ms", "ms"),
+            ("obstacle heights in feet", "ft"),
+            ("IMU roll/pitch bias [mrad]", "mrad"),
+            ("time between photos in s", "s"),
+            ("1 unit = 0.01 m", "m"),
+            ("column 4: ft", "ft"),
+            ("distances in feet", "ft"),
         ] {
             let (plain, doubtful) = of(line);
             assert_eq!((plain, doubtful), (vec![], Some(unit)), "{line}");
