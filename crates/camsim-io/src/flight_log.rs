@@ -245,6 +245,11 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
             &mut notes,
         );
     }
+    if rows.time_format == time_fields::TimeFormat::Number
+        && let Some(week) = layout.time.week.and_then(|column| table.first_number(column))
+    {
+        clock_rollover::add_week(&mut rows.rows, week, &mut notes);
+    }
     clock_rollover::leave_out_unset_clock(&mut rows.rows, &mut notes).map_err(problem)?;
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
     let (is_geodetic, reads_attitude) =

@@ -178,7 +178,7 @@ fn solutions_of_rtklib_are_read() {
             "weeks",
             in_weeks,
             track(ellipsoid()),
-            Ok(Flight { notes: &["weeks of 1 (`week`) are not added"], ..without_attitude() }),
+            Ok(Flight { notes: &["from GPS week 2260 on"], ..without_attitude() }),
         ),
         ("commas", commas.clone(), track(ellipsoid()), Ok(without_attitude())),
         ("commas, UTC", commas.replace("GPST,", "UTC,"), track(ellipsoid()), Ok(without_attitude())),
@@ -442,7 +442,7 @@ fn times_in_several_columns_are_read_or_named() {
             _ => format!("{},00:00:{:04.1}", dates[1], (row - 30) as f64 * 0.1),
         })
     };
-    let weeks: &[&str] = &["(`gps_week`) are not added"];
+    let weeks: &[&str] = &["from GPS week 2260 on"];
     let mut cases: Vec<Case<'_>> = Vec::new();
     for names in [
         "field.header.stamp.secs,field.header.stamp.nsecs",
@@ -457,6 +457,12 @@ fn times_in_several_columns_are_read_or_named() {
     }
     let with_arrival = "time,field.header.stamp.secs,field.header.stamp.nsecs";
     let of_week = |row: usize| format!("2260,{:.1}", 381_600.0 + row as f64 * 0.1);
+    let since_start = |row: usize| format!("2260,{:.1}", row as f64 * 0.1);
+    let over_week = |row: usize| match row {
+        0..30 => format!("2260,{:.1}", 604_797.0 + row as f64 * 0.1),
+        _ => format!("2261,{:.1}", (row - 30) as f64 * 0.1),
+    };
+    let over_weeks: &[&str] = &["from GPS week 2260 on", "after a week of GPS time"];
     let of_message = |row: usize| format!("{},{}", 5_000_000 + row * 102_000, 5_000_000 + row * 100_000);
     cases.extend([
         (
@@ -497,12 +503,9 @@ fn times_in_several_columns_are_read_or_named() {
             Err(&["05/04/2023", "year-month-day"]),
         ),
         ("week", rows_with_times("gps_week,tow", of_week), msl(), Ok(noted(weeks))),
-        (
-            "week with units",
-            rows_with_times("Week (weeks),GPSTime (sec)", of_week),
-            msl(),
-            Ok(noted(&["weeks of"])),
-        ),
+        ("week with units", rows_with_times("Week (weeks),GPSTime (sec)", of_week), msl(), Ok(noted(weeks))),
+        ("week beside time", rows_with_times("week,t", since_start), msl(), Ok(noted(&[]))),
+        ("end of the week", rows_with_times("week,tow", over_week), msl(), Ok(noted(over_weeks))),
         (
             "sample",
             rows_with_times("timestamp,timestamp_sample", of_message),
@@ -511,6 +514,19 @@ fn times_in_several_columns_are_read_or_named() {
         ),
     ]);
     check_all(cases);
+
+    // Each of these begins at 2023-05-04 10:00.
+    for content in [
+        rows_with_times("field.header.stamp.secs,field.header.stamp.nsecs", pair),
+        rows_with_times("date,time", dated("20230504")),
+        rows_with_times("date,time", dated("04.05.2023")),
+        rows_with_times("Lcl Date,Lcl Time", dated("2023-05-04")),
+        rows_with_times("gps_week,tow", of_week),
+        rows_with_times("Week (weeks),GPSTime (sec)", of_week),
+    ] {
+        let log = read(&content, &msl()).unwrap();
+        assert_eq!(log.epoch_ns, 1_683_194_400_000_000_000, "{}", content.lines().next().unwrap());
+    }
 }
 
 #[test]

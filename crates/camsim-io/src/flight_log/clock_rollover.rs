@@ -60,6 +60,26 @@ pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, no
     });
 }
 
+/// The beginning of the first GPS week, 1980-01-06.
+const FIRST_WEEK_NS: i128 = 315_964_800_000_000_000;
+/// GPS weeks of this century, to 2100.
+const WEEKS: std::ops::Range<f64> = 1000.0..6300.0;
+
+/// Adds the week of the first row to seconds of the week, which go on at its end already.
+pub(super) fn add_week(rows: &mut [ParsedRow], week: f64, notes: &mut Vec<Note>) {
+    let first_ns = rows.iter().find_map(|row| row.time);
+    if !WEEKS.contains(&week) || !first_ns.is_some_and(|time| (0..=7 * DAY_NS).contains(&time)) {
+        return;
+    }
+    for time in rows.iter_mut().filter_map(|row| row.time.as_mut()) {
+        *time += FIRST_WEEK_NS + week as i128 * 7 * DAY_NS;
+    }
+    notes.push(Note {
+        is_warning: false,
+        text: format!("the times count from GPS week {week:.0} on, without leap seconds"),
+    });
+}
+
 /// The year 2000. Clocks that are not set yet begin in 1970, 1980, 2000 or at the date of their firmware.
 const YEAR_2000_NS: i128 = 946_684_800_000_000_000;
 /// A year without rows is no pause of a flight.

@@ -117,9 +117,9 @@ pub(super) fn time_columns(
         split_stamps::check_is_clock(header, table, column)?;
     }
     let date = date_column(header, column, notes)?;
-    note_unused_weeks(header, table, column, unit_ns, notes);
+    let week = week_column(header, column);
     let column = sample_of(header, table, column, notes).unwrap_or(column);
-    Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, nanoseconds })
+    Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, week, nanoseconds })
 }
 
 /// The normal form of a name without its units in brackets.
@@ -150,34 +150,14 @@ fn date_column(header: &HeaderColumns, time: usize, notes: &mut Vec<Note>) -> Re
 /// Names of GPS weeks, in normal form.
 const WEEKS: [&str; 9] =
     ["week", "weeks", "gps_week", "gpsweek", "week_number", "gps_week_number", "week_no", "wn", "wno"];
-const WEEK_NS: f64 = 604_800e9;
 
-/// Notes weeks that are not added to the seconds of the week.
-fn note_unused_weeks(
-    header: &HeaderColumns,
-    table: &Table<'_>,
-    time: usize,
-    unit_ns: Option<f64>,
-    notes: &mut Vec<Note>,
-) {
-    let weeks: Vec<usize> =
-        (0..header.0.len()).filter(|&column| WEEKS.contains(&plain_name(header, column).as_str())).collect();
-    let is_in_week = || {
-        table.sample(100).all(|row| {
-            let value = table.fields(row).get(time).and_then(|field| table.number(field));
-            value.is_some_and(|value| value.is_nan() || value * unit_ns.unwrap_or(1e9) <= WEEK_NS)
-        })
-    };
-    // ArduPilot's clock, since the start, is no time of a week.
-    if !weeks.is_empty() && header.name(time) != "TimeUS" && is_in_week() {
-        push_information(
-            notes,
-            format!(
-                "the weeks of {} are not added: the times count from the start of a week",
-                header.describe(&weeks)
-            ),
-        );
-    }
+/// The column of the weeks, beside times that by their name count within one.
+fn week_column(header: &HeaderColumns, time: usize) -> Option<usize> {
+    let name = plain_name(header, time);
+    let is_of_week =
+        name.starts_with("sec") || ["tow", "sow", "week", "gps"].iter().any(|part| name.contains(part));
+    let is_week = |&column: &usize| WEEKS.contains(&plain_name(header, column).as_str());
+    (0..header.0.len()).find(is_week).filter(|_| is_of_week)
 }
 
 /// The time of the measurement beside that of its message, as PX4 names it: `timestamp_sample`.
