@@ -73,6 +73,7 @@ mod row_selection;
 mod rows;
 mod scalars;
 mod sparse_rows;
+mod split_stamps;
 mod stamp_resolution;
 mod statements;
 mod streams;
@@ -100,6 +101,8 @@ pub struct RawLog {
     pub rows: Vec<RawRow>,
     /// Notes about what was inferred, chosen, or left out.
     pub notes: Vec<Note>,
+    /// How quaternions of a table were read; `None` of other files and other attitudes.
+    quaternions: Option<attitude_check::QuaternionReading>,
 }
 
 /// Speed between two rows above which a jump of the position is reported.
@@ -134,9 +137,10 @@ pub fn read_flight_log(
         }
         FlightLogError::Log { path: path.to_owned(), source }
     })?;
-    log.notes = raw.notes;
+    log.notes.clone_from(&raw.notes);
     if spec.attitude == AttitudeSource::Log {
-        log.notes.extend(attitude_check::notes(&log, &raw.rows));
+        let notes = attitude_check::notes(&log, &raw);
+        log.notes.extend(notes);
     }
     without_repetitions(&mut log.notes);
     // Only geodetic positions are known to be in metres; local ones may have any unit of length.
@@ -221,7 +225,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     notes.extend(unused_keys::unused_topic_note(spec));
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     row_selection::keep_rows(&mut table, &layout, &mut notes).map_err(problem)?;
-    let mut rows = rows::read(path, &table, &layout)?;
+    let mut rows = rows::read(path, &table, &layout, &mut notes)?;
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
     let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
     angle_unit::angles_to_degrees(&mut rows, &layout, spec, &mut notes).map_err(problem)?;
@@ -241,7 +245,12 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
             &mut notes,
         );
     }
-    clock_rollover::leave_out_unset_clock(&mut rows.rows, &mut notes);
+    if rows.time_format == time_fields::TimeFormat::Number
+        && let Some(week) = layout.time.week.and_then(|column| table.first_number(column))
+    {
+        clock_rollover::add_week(&mut rows.rows, week, &mut notes);
+    }
+    clock_rollover::leave_out_unset_clock(&mut rows.rows, &mut notes).map_err(problem)?;
     clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
     let (is_geodetic, reads_attitude) =
         (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
@@ -255,7 +264,15 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         });
     }
     let kind = layout.attitude.kind();
-    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect(), notes })
+    let quaternions = match layout.attitude {
+        AttitudeColumns::Quaternion([x, _, _, w]) => Some(attitude_check::QuaternionReading {
+            is_scalar_first: w < x,
+            is_enu: layout.frame == Frame::EastNorthUp,
+        }),
+        _ => None,
+    };
+    let rows = rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect();
+    Ok(RawLog { rows, notes, quaternions })
 }
 
 /// Rotation by half a turn about x, which negates y and z.

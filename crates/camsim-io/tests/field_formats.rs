@@ -174,7 +174,12 @@ fn solutions_of_rtklib_are_read() {
         ("blanks, msl", blanks.clone(), track(msl()), Ok(Flight { notes: stated, ..without_attitude() })),
         ("geodetic", blanks.replace("/ellipsoidal", "/geodetic"), track(msl()), Ok(without_attitude())),
         ("UTC", blanks.replace("%  GPST", "%  UTC "), track(ellipsoid()), Ok(without_attitude())),
-        ("weeks", in_weeks, track(ellipsoid()), Ok(without_attitude())),
+        (
+            "weeks",
+            in_weeks,
+            track(ellipsoid()),
+            Ok(Flight { notes: &["from GPS week 2260 on"], ..without_attitude() }),
+        ),
         ("commas", commas.clone(), track(ellipsoid()), Ok(without_attitude())),
         ("commas, UTC", commas.replace("GPST,", "UTC,"), track(ellipsoid()), Ok(without_attitude())),
         ("baseline", baseline, track(ellipsoid()), Ok(without_attitude())),
@@ -376,9 +381,16 @@ fn clocks_of_several_kinds_are_read() {
         seconds: 5.0,
         velocity_m_s: [7.04, 13.26, -1.0],
         tolerance_m_s: 0.2,
-        notes: &["10 rows have times before 1990"],
+        notes: &["10 rows have times 43 years before the others"],
         ..without_attitude()
     };
+    let with_year_2000 = |rows: usize| {
+        lines(&dates_only, |index, line| match index {
+            index if (1..=rows).contains(&index) => line.replace("2023-05-04", "2000-01-01"),
+            _ => line.to_owned(),
+        })
+    };
+    let since_2000 = Flight { notes: &["10 rows have times 23 years before the others"], ..set };
     let other_datum: &[&str] = &["(`altitude system`) says, are above mean sea level"];
     check_all(vec![
         ("stamp and arrival", two, tum, Ok(stamps)),
@@ -386,6 +398,13 @@ fn clocks_of_several_kinds_are_read() {
         ("whole seconds, from within one", without(3), msl(), Ok(later(58, 5.7, 60.6))),
         ("one time", stopped, msl(), Err(&["all times are equal (61 rows"])),
         ("clock not set yet", unset, track(msl()), Ok(set)),
+        ("clock not set yet, of 2000", with_year_2000(10), track(msl()), Ok(since_2000)),
+        (
+            "clock set late",
+            with_year_2000(40),
+            track(msl()),
+            Err(&["the times jump by 23 years at line 42", "keep the rows before it"]),
+        ),
         ("GoPro", go_pro.clone(), track(msl()), Ok(without_attitude())),
         (
             "GoPro, ellipsoid",
@@ -395,6 +414,119 @@ fn clocks_of_several_kinds_are_read() {
         ),
         ("dates only", dates_only, track(msl()), Ok(without_attitude())),
     ]);
+}
+
+/// A straight flight of 6 s with times in the columns of these names.
+fn rows_with_times(names: &str, times: impl Fn(usize) -> String) -> String {
+    let mut text = format!("{names},lat,lon,alt,roll,pitch,yaw\n");
+    for row in 0..=60 {
+        let t = row as f64 * 0.1;
+        let (lat, lon) = (47.05 + t * 7.5 * 8.994_6e-6, 8.31 + t * 13.0 * 1.316_0e-5);
+        text += &format!("{},{lat:.9},{lon:.9},{:.3},5,2,60\n", times(row), 480.0 + t);
+    }
+    text
+}
+
+#[test]
+fn times_in_several_columns_are_read_or_named() {
+    let nanoseconds = |row: usize| (row % 10) * 100_000_000;
+    let pair = |row: usize| format!("{},{}", 1_683_194_400 + row / 10, nanoseconds(row));
+    let late = |row: usize| format!("{},{}", 1_683_194_400_005_000_000 + row * 100_000_000, pair(row));
+    let clock = |row: usize| format!("10:00:{:04.1}", row as f64 * 0.1);
+    let dated = |date: &'static str| move |row: usize| format!("{date},{}", clock(row));
+    let noted = |notes| Flight { notes, ..USUAL };
+    let not_read: &[&str] = &["holds dates that are not read"];
+    let over_midnight = |names: &str, dates: [&str; 2]| {
+        rows_with_times(names, |row| match row {
+            0..30 => format!("{},23:59:{:04.1}", dates[0], 57.0 + row as f64 * 0.1),
+            _ => format!("{},00:00:{:04.1}", dates[1], (row - 30) as f64 * 0.1),
+        })
+    };
+    let weeks: &[&str] = &["from GPS week 2260 on"];
+    let mut cases: Vec<Case<'_>> = Vec::new();
+    for names in [
+        "field.header.stamp.secs,field.header.stamp.nsecs",
+        "field.header.stamp.sec,field.header.stamp.nanosec",
+        "header.stamp.secs,header.stamp.nsecs",
+        "rosbagTimestamp_secs,nsecs",
+        "sec,nanosec",
+        "timestamp_sec,timestamp_nanosec",
+        "msg/Time/Secs,msg/Time/NSecs",
+    ] {
+        cases.push((names, rows_with_times(names, pair), msl(), Ok(noted(&[]))));
+    }
+    let with_arrival = "time,field.header.stamp.secs,field.header.stamp.nsecs";
+    let of_week = |row: usize| format!("2260,{:.1}", 381_600.0 + row as f64 * 0.1);
+    let since_start = |row: usize| format!("2260,{:.1}", row as f64 * 0.1);
+    let over_week = |row: usize| match row {
+        0..30 => format!("2260,{:.1}", 604_797.0 + row as f64 * 0.1),
+        _ => format!("2261,{:.1}", (row - 30) as f64 * 0.1),
+    };
+    let over_weeks: &[&str] = &["from GPS week 2260 on", "after a week of GPS time"];
+    let of_message = |row: usize| format!("{},{}", 5_000_000 + row * 102_000, 5_000_000 + row * 100_000);
+    cases.extend([
+        (
+            "beside the arrival",
+            rows_with_times(with_arrival, late),
+            msl(),
+            Ok(noted(&["of the measurement counts: `field.header.stamp.secs`"])),
+        ),
+        (
+            "nanoseconds alone",
+            rows_with_times("header.stamp.nsecs", |row| nanoseconds(row).to_string()),
+            msl(),
+            Err(&["nanoseconds within a second", "line 12", "stamp.secs"] as &[&str]),
+        ),
+        (
+            "nanoseconds of another name alone",
+            rows_with_times("field.stamp_ns,time_of_x", |row| format!("{},x", nanoseconds(row))),
+            msl(),
+            Err(&["nanoseconds within a second"]),
+        ),
+        ("8 digits", over_midnight("date,time", ["20230504", "20230505"]), msl(), Ok(noted(&[]))),
+        ("dots", over_midnight("date,time", ["04.05.2023", "05.05.2023"]), msl(), Ok(noted(&[]))),
+        ("day first", over_midnight("date,time", ["30/05/2023", "31/05/2023"]), msl(), Ok(noted(&[]))),
+        ("month first", over_midnight("date,time", ["05/30/2023", "05/31/2023"]), msl(), Ok(noted(&[]))),
+        ("G1000", over_midnight("Lcl Date, Lcl Time", ["2023-05-04", "2023-05-05"]), msl(), Ok(noted(&[]))),
+        (
+            "two dates",
+            rows_with_times("date,lcl_date,lcl_time", |row| format!("x,2023-05-04,{}", clock(row))),
+            msl(),
+            Ok(noted(&["`lcl_date` counts"])),
+        ),
+        ("ambiguous", rows_with_times("date,time", dated("05/04/2023")), msl(), Ok(noted(not_read))),
+        ("two digits", rows_with_times("date,time", dated("04.05.23")), msl(), Ok(noted(not_read))),
+        (
+            "ambiguous over midnight",
+            over_midnight("date,time", ["05/04/2023", "05/05/2023"]),
+            msl(),
+            Err(&["05/04/2023", "year-month-day"]),
+        ),
+        ("week", rows_with_times("gps_week,tow", of_week), msl(), Ok(noted(weeks))),
+        ("week with units", rows_with_times("Week (weeks),GPSTime (sec)", of_week), msl(), Ok(noted(weeks))),
+        ("week beside time", rows_with_times("week,t", since_start), msl(), Ok(noted(&[]))),
+        ("end of the week", rows_with_times("week,tow", over_week), msl(), Ok(noted(over_weeks))),
+        (
+            "sample",
+            rows_with_times("timestamp,timestamp_sample", of_message),
+            msl(),
+            Ok(noted(&["measurement counts: `timestamp_sample`", "read as us"])),
+        ),
+    ]);
+    check_all(cases);
+
+    // Each of these begins at 2023-05-04 10:00.
+    for content in [
+        rows_with_times("field.header.stamp.secs,field.header.stamp.nsecs", pair),
+        rows_with_times("date,time", dated("20230504")),
+        rows_with_times("date,time", dated("04.05.2023")),
+        rows_with_times("Lcl Date,Lcl Time", dated("2023-05-04")),
+        rows_with_times("gps_week,tow", of_week),
+        rows_with_times("Week (weeks),GPSTime (sec)", of_week),
+    ] {
+        let log = read(&content, &msl()).unwrap();
+        assert_eq!(log.epoch_ns, 1_683_194_400_000_000_000, "{}", content.lines().next().unwrap());
+    }
 }
 
 #[test]

@@ -352,6 +352,7 @@ fn instances_frames_and_flags_are_read_as_the_files_state_them() {
                 first: [40.0, 0.0, 0.0],
                 off_line_m: 41.0,
                 velocity: [7.5 - 40.0 / 3.0, 13.0, -1.0],
+                warnings: &["the attitude is the same in every row"],
                 ..GEODETIC
             }),
         ),
@@ -375,6 +376,7 @@ fn instances_frames_and_flags_are_read_as_the_files_state_them() {
                 first: [40.0, 0.0, 0.0],
                 off_line_m: 41.0,
                 velocity: [7.5 - 40.0 / 3.0, 13.0, -1.0],
+                warnings: &["the attitude is the same in every row"],
                 ..GEODETIC
             }),
         ),

@@ -14,7 +14,7 @@ use camsim_core::{
     },
 };
 use camsim_io::flight_log::read_flight_log;
-use glam::EulerRot;
+use glam::{DMat3, DQuat, DVec3, EulerRot};
 
 /// Heights above mean sea level, from an origin at 480 m.
 fn spec() -> FlightSpec {
@@ -738,13 +738,21 @@ fn conventions_of_trajectories_are_applied_or_named() {
 }
 
 /// A circle flown within 60 s, level, with the attitude of each pattern: `{yaw}` is the course, `{w}` and `{z}`
-/// the quaternion of a forward-left-up body along it.
+/// the quaternion of a forward-left-up body along it, `{xo}` to `{wo}` that of a camera.
 fn circle(head: &str, pattern: &str) -> String {
     let mut text = if head.is_empty() { String::new() } else { format!("{head}\n") };
     for row in 0..=600 {
         let t = f64::from(row) * 0.1;
         let course = (t * 6.0).to_radians();
         let half_left_of_east = (90_f64.to_radians() - course) / 2.0;
+        let latitude_deg = 47.05 + 100.0 * course.sin() * 8.994_6e-6;
+        let longitude_deg = 8.31 + (100.0 - 100.0 * course.cos()) * 1.3176e-5;
+        // A camera that looks along the course: x right, y down, z forward.
+        let optical = DQuat::from_mat3(&DMat3::from_cols(
+            DVec3::new(course.cos(), -course.sin(), 0.0),
+            -DVec3::Z,
+            DVec3::new(course.sin(), course.cos(), 0.0),
+        ));
         let numbers = [
             ("{t}", format!("{t:.1}")),
             ("{east}", format!("{:.4}", 100.0 - 100.0 * course.cos())),
@@ -752,6 +760,14 @@ fn circle(head: &str, pattern: &str) -> String {
             ("{yaw}", format!("{:.3}", course.to_degrees())),
             ("{w}", format!("{:.9}", half_left_of_east.cos())),
             ("{z}", format!("{:.9}", half_left_of_east.sin())),
+            ("{lat}", format!("{:.9}", latitude_deg)),
+            ("{lon}", format!("{:.9}", longitude_deg)),
+            ("{lat_rad}", format!("{:.12}", latitude_deg.to_radians())),
+            ("{lon_rad}", format!("{:.12}", longitude_deg.to_radians())),
+            ("{wo}", format!("{:.9}", optical.w)),
+            ("{xo}", format!("{:.9}", optical.x)),
+            ("{yo}", format!("{:.9}", optical.y)),
+            ("{zo}", format!("{:.9}", optical.z)),
         ];
         let row = numbers.iter().fold(pattern.to_owned(), |row, (name, number)| row.replace(name, number));
         text += &row;
@@ -786,6 +802,42 @@ fn attitudes_that_contradict_the_path_are_named() {
             with(&["the attitude is the same in every row"]),
         ),
         ("identity", circle("", &format!("{xyz} 0 0 0 1")), with(&["set flight.attitude = \"track\""])),
+        (
+            "zeros by latitude",
+            circle("t,lat,lon,alt,roll,pitch,yaw", "{t},{lat},{lon},480,0,0,0"),
+            with(&["the attitude is the same in every row"]),
+        ),
+        (
+            "one attitude by latitude",
+            circle("t,lat_rad,lon_rad,alt,roll,pitch,yaw", "{t},{lat_rad},{lon_rad},480,5,2,60"),
+            with(&["the attitude is the same in every row"]),
+        ),
+        (
+            "identity by latitude",
+            circle("t,lat,lon,alt,qw,qx,qy,qz", "{t},{lat},{lon},480,1,0,0,0"),
+            with(&["as PX4 writes", "the attitude is the same in every row"]),
+        ),
+        (
+            "a circle by latitude",
+            circle("t,lat,lon,alt,roll,pitch,yaw", "{t},{lat},{lon},480,0,0,{yaw}"),
+            with(&[]),
+        ),
+        (
+            "optical axes",
+            circle("", &format!("{xyz} {{xo}} {{yo}} {{zo}} {{wo}}")),
+            with(&["belong to camera (optical) axes"]),
+        ),
+        (
+            "optical axes, named",
+            circle("# t tx ty tz qx qy qz qw", &format!("{xyz} {{xo}} {{yo}} {{zo}} {{wo}}")),
+            with(&["belong to camera (optical) axes"]),
+        ),
+        (
+            "z down",
+            circle("", &format!("{xyz} {{w}} {{z}} 0 0")),
+            with(&["upside down in every row: do the quaternions belong to a body with other axes"]),
+        ),
+        ("roll of -90", circle(ned, "{t},{north},{east},0,-88,0,{yaw}"), with(&["lies on its side"])),
         (
             "one heading",
             circle(ned, "{t},{north},{east},0,0,0,45"),

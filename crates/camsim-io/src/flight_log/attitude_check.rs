@@ -1,9 +1,9 @@
-//! Attitudes that contradict the flight: the body upside down, or one attitude while the path turns.
+//! Attitudes that contradict the flight: the body not upright, or one attitude while the path turns.
 
 use camsim_core::flight_log::{FlightLog, LogRow, Note, RawAttitude, RawRow};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, EulerRot};
 
-use super::{FLU_FROM_FRD, ned_from_enu};
+use super::{FLU_FROM_FRD, RawLog, ned_from_enu};
 
 /// Rows that are looked at.
 const MAX_ROWS: usize = 2000;
@@ -18,75 +18,118 @@ const STEP_OF_EXTENT: f64 = 0.05;
 /// Extent below which the path is that of a body at rest, metres.
 const MIN_EXTENT_M: f64 = 0.5;
 
+/// How the quaternions of a table are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct QuaternionReading {
+    /// Whether the scalar stands first.
+    pub(super) is_scalar_first: bool,
+    /// Whether they turn forward-left-up bodies to east, north, up.
+    pub(super) is_enu: bool,
+}
+
 /// Warnings about the attitudes that the rows of a log state.
-pub(super) fn notes(log: &FlightLog, raw: &[RawRow]) -> Vec<Note> {
+pub(super) fn notes(log: &FlightLog, raw: &RawLog) -> Vec<Note> {
     let sample: Vec<LogRow> =
         log.rows.iter().step_by(log.rows.len().div_ceil(MAX_ROWS).max(1)).copied().collect();
-    let has_quaternions = raw.iter().any(|row| matches!(row.attitude, RawAttitude::Quaternion(_)));
+    let has_quaternions = raw.rows.iter().any(|row| matches!(row.attitude, RawAttitude::Quaternion(_)));
     if sample.len() < 3 {
         return Vec::new();
     }
-    let texts = [upside_down(&sample, has_quaternions), constant(&sample)];
+    let attitudes: Vec<DQuat> = sample.iter().map(|row| row.ned_from_body).collect();
+    let tilted = match has_quaternions {
+        true => tilted_quaternions(&attitudes, raw.quaternions),
+        false => tilted_angles(&attitudes),
+    };
+    let texts = [tilted, constant(&sample, &raw.rows)];
     texts.into_iter().flatten().map(|text| Note { is_warning: true, text }).collect()
 }
 
-/// Share of attitudes whose body has its down axis at least this far along down.
-fn share(attitudes: &[DQuat], is_so: impl Fn(f64) -> bool) -> f64 {
-    let count = attitudes.iter().filter(|attitude| is_so((**attitude * DVec3::Z).z)).count();
+/// Share of attitudes in which an axis of the body points at least this far along down.
+fn share(attitudes: &[DQuat], axis: DVec3, is_so: impl Fn(f64) -> bool) -> f64 {
+    let count = attitudes.iter().filter(|attitude| is_so((**attitude * axis).z)).count();
     count as f64 / attitudes.len() as f64
 }
 
-/// Says that the body is upside down, or that only another order of the quaternions makes it upright.
-fn upside_down(rows: &[LogRow], has_quaternions: bool) -> Option<String> {
-    let attitudes: Vec<DQuat> = rows.iter().map(|row| row.ned_from_body).collect();
-    let is_upright = |down: f64| down > UPRIGHT;
-    let inverted = share(&attitudes, |down| down < UPSIDE_DOWN);
-    let order = has_quaternions.then(|| better_order(&attitudes)).flatten();
-    let is_wrong_order = order.is_some() && share(&attitudes, is_upright) < 0.5;
-    if inverted < 0.99 && !is_wrong_order {
-        return None;
-    }
-    let what = if inverted < 0.99 { "is not upright in most rows" } else { "is upside down in every row" };
-    let cause = match order {
-        Some(order) => format!(
-            "in the order {order} the quaternions would be upright: is that theirs? Then name the columns"
-        ),
-        None if has_quaternions => {
-            "do the quaternions belong to a body with other axes (camera.mount turns a \
-            camera that looks along another one), or to a world with z the other way?"
-                .to_owned()
-        }
-        None => "does roll count from inverted flight, or belong to a body with z up?".to_owned(),
-    };
-    Some(format!("the body {what}: {cause}"))
+fn is_upright(down: f64) -> bool {
+    down > UPRIGHT
 }
 
-/// The order of the numbers of the quaternions in which nearly all are upright; `None` if there is none other
-/// than that in which they were read.
-fn better_order(attitudes: &[DQuat]) -> Option<&'static str> {
-    type Reorder = fn(DQuat) -> DQuat;
-    let orders: [(&str, Reorder); 2] = [
-        // Read as x, y, z, w.
-        ("w, x, y, z", |q| DQuat::from_xyzw(q.y, q.z, q.w, q.x)),
-        // Read as w, x, y, z.
-        ("x, y, z, w", |q| DQuat::from_xyzw(q.w, q.x, q.y, q.z)),
-    ];
-    let to_enu = ned_from_enu().inverse();
-    orders.into_iter().find_map(|(name, reorder)| {
-        let as_ned: Vec<DQuat> = attitudes.iter().map(|&q| reorder(q)).collect();
-        let as_enu: Vec<DQuat> = attitudes
-            .iter()
-            .map(|&q| ned_from_enu() * reorder(to_enu * q * FLU_FROM_FRD.inverse()) * FLU_FROM_FRD)
-            .collect();
-        [as_ned, as_enu].iter().any(|all| share(all, |down| down > UPRIGHT) > 0.95).then_some(name)
+/// Says that angles turn the body upside down or on its side.
+fn tilted_angles(attitudes: &[DQuat]) -> Option<String> {
+    if share(attitudes, DVec3::Z, |down| down < UPSIDE_DOWN) >= 0.99 {
+        let cause = "does roll count from inverted flight, or belong to a body with z up?";
+        return Some(format!("the body is upside down in every row: {cause}"));
+    }
+    let lies = [DVec3::Y, -DVec3::Y].into_iter().any(|side| share(attitudes, side, is_upright) >= 0.99);
+    lies.then(|| {
+        "the body lies on its side in every row: do the angles belong to camera (optical) axes? Those of the \
+            body belong here, and camera.mount says where the camera looks"
+            .to_owned()
     })
 }
 
-/// Says that the attitude is the same in all rows although the path turns.
-fn constant(rows: &[LogRow]) -> Option<String> {
-    let first = rows[0].ned_from_body;
-    let is_same = |row: &LogRow| row.ned_from_body.dot(first).abs() > 1.0 - 1e-12;
-    if !rows.iter().all(is_same) {
+/// Says that quaternions do not leave the body upright, with the readings in which it would be.
+fn tilted_quaternions(attitudes: &[DQuat], reading: Option<QuaternionReading>) -> Option<String> {
+    if share(attitudes, DVec3::Z, is_upright) >= 0.5 {
+        return None;
+    }
+    const AXES: &str = "do the quaternions belong to a body with other axes, as those of a camera (camera.mount \
+        says where the camera looks), or to a world with z the other way?";
+    const OPTICAL: &str = "do the quaternions belong to camera (optical) axes, x right, y down, z forward? Then turn \
+        them to a body with x forward; camera.mount says where the camera looks";
+    let mut causes = Vec::new();
+    if let Some(reading) = reading
+        && share(&in_the_other_order(attitudes, reading), DVec3::Z, is_upright) > 0.95
+    {
+        let order = if reading.is_scalar_first { "x, y, z, w" } else { "w, x, y, z" };
+        causes.push(format!(
+            "in the order {order} the quaternions would be upright: is that theirs? Then name the columns"
+        ));
+    }
+    // The axis of the body that points down, and what its axes may then be.
+    for (axis, cause) in [(-DVec3::Z, AXES), (DVec3::Y, OPTICAL), (-DVec3::Y, OPTICAL)] {
+        if share(attitudes, axis, is_upright) > 0.95 {
+            causes.push(cause.to_owned());
+        }
+    }
+    if causes.is_empty() {
+        return None;
+    }
+    let what = if share(attitudes, DVec3::Z, |down| down < UPSIDE_DOWN) >= 0.99 {
+        "is upside down in every row"
+    } else {
+        "is not upright in most rows"
+    };
+    Some(format!("the body {what}: {}", causes.join("; or: ")))
+}
+
+/// The attitudes if the scalar of the quaternions stood at the other end.
+fn in_the_other_order(attitudes: &[DQuat], reading: QuaternionReading) -> Vec<DQuat> {
+    let reorder = |q: DQuat| match reading.is_scalar_first {
+        true => DQuat::from_xyzw(q.w, q.x, q.y, q.z),
+        false => DQuat::from_xyzw(q.y, q.z, q.w, q.x),
+    };
+    let in_enu = |q: DQuat| {
+        ned_from_enu() * reorder(ned_from_enu().inverse() * q * FLU_FROM_FRD.inverse()) * FLU_FROM_FRD
+    };
+    attitudes.iter().map(|&q| if reading.is_enu { in_enu(q) } else { reorder(q) }).collect()
+}
+
+/// Says that the attitude is the same in all rows although the path turns. The rows of the file count: north
+/// is not the same direction at all places.
+fn constant(rows: &[LogRow], raw: &[RawRow]) -> Option<String> {
+    let mut attitudes = raw.iter().filter_map(|row| match row.attitude {
+        RawAttitude::None => None,
+        RawAttitude::EulerDeg(angles) => {
+            let [roll, pitch, yaw] = angles.map(f64::to_radians);
+            Some(DQuat::from_euler(EulerRot::ZYX, yaw, pitch, roll))
+        }
+        RawAttitude::Quaternion(quaternion) => Some(quaternion),
+    });
+    let first = attitudes.next()?;
+    // Incomplete attitudes are NaN, and do not count.
+    let differs = |attitude: DQuat| attitude.dot(first).abs() <= 1.0 - 1e-12;
+    if attitudes.any(differs) {
         return None;
     }
     let turn = path_turn(rows).filter(|turn| *turn > TURN)?;

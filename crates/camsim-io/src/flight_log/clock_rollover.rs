@@ -60,27 +60,63 @@ pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, no
     });
 }
 
-/// The years 1990 and 2000. Clocks that are not set yet begin in 1970 or 1980.
-const YEAR_1990_NS: i128 = 631_152_000_000_000_000;
-const YEAR_2000_NS: i128 = 946_684_800_000_000_000;
+/// The beginning of the first GPS week, 1980-01-06.
+const FIRST_WEEK_NS: i128 = 315_964_800_000_000_000;
+/// GPS weeks of this century, to 2100.
+const WEEKS: std::ops::Range<f64> = 1000.0..6300.0;
 
-/// Leaves out the rows of a clock that was not set yet, where most rows have dates of this century.
-pub(super) fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<Note>) {
-    let count = |is_counted: &dyn Fn(i128) -> bool| {
-        rows.iter().filter_map(|row| row.time).filter(|time| is_counted(*time)).count()
-    };
-    let (unset, set) = (count(&|time| time < YEAR_1990_NS), count(&|time| time >= YEAR_2000_NS));
-    if unset == 0 || unset > set {
+/// Adds the week of the first row to seconds of the week, which go on at its end already.
+pub(super) fn add_week(rows: &mut [ParsedRow], week: f64, notes: &mut Vec<Note>) {
+    let first_ns = rows.iter().find_map(|row| row.time);
+    if !WEEKS.contains(&week) || !first_ns.is_some_and(|time| (0..=7 * DAY_NS).contains(&time)) {
         return;
     }
-    rows.retain(|row| row.time.is_none_or(|time| time >= YEAR_1990_NS));
+    for time in rows.iter_mut().filter_map(|row| row.time.as_mut()) {
+        *time += FIRST_WEEK_NS + week as i128 * 7 * DAY_NS;
+    }
+    notes.push(Note {
+        is_warning: false,
+        text: format!("the times count from GPS week {week:.0} on, without leap seconds"),
+    });
+}
+
+/// The year 2000. Clocks that are not set yet begin in 1970, 1980, 2000 or at the date of their firmware.
+const YEAR_2000_NS: i128 = 946_684_800_000_000_000;
+/// A year without rows is no pause of a flight.
+const YEAR_NS: i128 = 365 * DAY_NS;
+
+/// Leaves out the rows of a clock that was not set yet: those years before the others, if they are fewer.
+///
+/// # Errors
+/// Years lie between the rows, and most of them are before.
+pub(super) fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<Note>) -> Result<(), String> {
+    let mut times: Vec<(i128, usize)> =
+        rows.iter().filter_map(|row| row.time.map(|time| (time, row.line))).collect();
+    times.sort_unstable();
+    let is_jump = |pair: &[(i128, usize)]| pair[1].0 - pair[0].0 > YEAR_NS && pair[1].0 >= YEAR_2000_NS;
+    let Some(last_unset) = times.windows(2).rposition(is_jump) else { return Ok(()) };
+    let (unset, set) = (last_unset + 1, times.len() - last_unset - 1);
+    let years = (times[unset].0 - times[last_unset].0) as f64 / YEAR_NS as f64;
+    if unset > set {
+        return if set < MIN_FLIGHT_ROWS { Ok(()) } else { Err(jump_message(times[unset].1, years)) };
+    }
+    let first_set_ns = times[unset].0;
+    rows.retain(|row| row.time.is_none_or(|time| time >= first_set_ns));
     notes.push(Note {
         is_warning: true,
         text: format!(
-            "{unset} rows have times before 1990, as of a clock that is not set yet, and are left out: the \
-                others are of this century"
+            "{unset} rows have times {years:.0} years before the others, as of a clock that is not set yet, \
+                and are left out"
         ),
     });
+    Ok(())
+}
+
+fn jump_message(line: usize, years: f64) -> String {
+    format!(
+        "the times jump by {years:.0} years at line {line}, as when a clock is set: keep the rows before it or \
+            those from it on"
+    )
 }
 
 /// With fewer rows than this before or after it, a fall of the times is an outlier, not a second flight.

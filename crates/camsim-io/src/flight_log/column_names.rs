@@ -111,7 +111,8 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
             "header_stamp_nsecs",
             "header_stamp_nanosec",
         ],
-        "nanoseconds: added to a column of whole seconds, else the time itself, if the values rise as a clock does",
+        "nanoseconds: added to the seconds (`NAME_secs`, `NAME_nsecs`), else the time itself; refused where they begin \
+            again each second",
         "applied",
     ),
     known_name(
@@ -136,8 +137,8 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
     ),
     known_name(
         ColumnMeaning::Date,
-        &["date", "day", "utc_date", "date_utc", "gps_date_stamp"],
-        "date, `year-month-day`; or date and time as text",
+        &["date", "day", "local_date", "utc_date", "date_utc", "gps_date_stamp"],
+        "date, `year-month-day` or as below; or date and time as text",
         "applied to clock times; a date with a time where no other column is a time",
     ),
     known_name(
@@ -605,11 +606,11 @@ pub(super) fn find(name: &str) -> Option<&'static KnownName> {
     // `imu_x` is no position, and `gps_h` may be an accuracy: after a prefix only names of more than two
     // letters count, and only those of these meanings.
     let after_prefix = |name: &str| {
-        use ColumnMeaning::{Height, Latitude, LatitudeLongitude, Longitude, Pitch, Roll, Time, Yaw};
+        use ColumnMeaning::{Date, Height, Latitude, LatitudeLongitude, Longitude, Pitch, Roll, Time, Yaw};
         let is_allowed = |known: &&KnownName| {
             matches!(
                 known.meaning,
-                Time | Latitude | Longitude | LatitudeLongitude | Height(_) | Roll | Pitch | Yaw
+                Time | Date | Latitude | Longitude | LatitudeLongitude | Height(_) | Roll | Pitch | Yaw
             )
         };
         (name.len() > 2).then(|| exact(name).filter(is_allowed)).flatten()

@@ -9,9 +9,10 @@ use super::{
     column_meaning::ColumnMeaning,
     column_names,
     columns::{AttitudeColumns, FieldSource, Frame, TimeColumns, format_name},
-    header::HeaderColumns,
+    header::{HeaderColumns, normal_form},
     height_column::{height_column, is_height},
     missing_columns::missing_columns_message,
+    split_stamps,
     text_table::{Separator, Table},
     time_fields::TimeFormat,
     unknown_unit::unknown_units,
@@ -56,6 +57,7 @@ pub(super) fn time_columns(
     table: &Table<'_>,
     notes: &mut Vec<Note>,
 ) -> Result<TimeColumns, String> {
+    let all_times = header.columns_where(|meaning| meaning == ColumnMeaning::Time);
     let times = stamps_of_the_measurement(header, table, notes);
     let mut parts = header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart);
     parts.retain(|&column| header.stem(column) != "ns" || !counts_satellites(table, column));
@@ -99,18 +101,81 @@ pub(super) fn time_columns(
             header.describe(&[&time_parts[..], &[column]].concat())
         ));
     }
-    // ROS stamps are split into seconds and nanoseconds.
-    let nanoseconds = match (&parts[..], times.is_empty()) {
-        ([], _) | (_, true) => None,
-        ([part], false)
-            if header.stem(column).starts_with("sec") || header.stem(column).contains("stamp_sec") =>
-        {
-            Some(*part)
-        }
-        _ => return Err(header.ambiguity_message(&[&times[..], &parts[..]].concat())),
+    let is_of_another = |part: &usize| {
+        all_times.iter().any(|&time| split_stamps::nanoseconds_of(header, time) == Some(*part))
     };
-    let date = header.unique(ColumnMeaning::Date)?;
-    Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, nanoseconds })
+    let others = parts.iter().all(is_of_another);
+    let nanoseconds = match (split_stamps::nanoseconds_of(header, column), &parts[..]) {
+        (Some(part), _) => Some(part),
+        (None, [part]) if !times.is_empty() && header.stem(column).starts_with("sec") => Some(*part),
+        (None, [_, ..]) if !times.is_empty() && !others => {
+            return Err(header.ambiguity_message(&[&times[..], &parts[..]].concat()));
+        }
+        (None, _) => None,
+    };
+    if nanoseconds.is_none() && unit_ns == Some(column_names::NANOSECONDS.factor) {
+        split_stamps::check_is_clock(header, table, column)?;
+    }
+    let date = date_column(header, column, notes)?;
+    let week = week_column(header, column);
+    let column = sample_of(header, table, column, notes).unwrap_or(column);
+    Ok(TimeColumns { column, unit_ns, integers_are_ns: false, date, week, nanoseconds })
+}
+
+/// The normal form of a name without its units in brackets.
+fn plain_name(header: &HeaderColumns, column: usize) -> String {
+    normal_form(header.name(column).split(['[', '(']).next().unwrap_or(""))
+}
+
+/// The column of the dates; of several that whose name begins as that of the time does, else the first.
+///
+/// # Errors
+/// Its name has a unit.
+fn date_column(header: &HeaderColumns, time: usize, notes: &mut Vec<Note>) -> Result<Option<usize>, String> {
+    let mut dates = header.columns_where(|meaning| meaning == ColumnMeaning::Date);
+    dates.retain(|&column| column != time);
+    let first_word = |column: usize| normal_form(header.name(column)).split('_').next().map(str::to_owned);
+    let alike = dates.iter().copied().find(|&column| first_word(column) == first_word(time));
+    let Some(date) = alike.or(dates.first().copied()) else { return Ok(None) };
+    header.check_usable(date)?;
+    if dates.len() > 1 {
+        push_information(
+            notes,
+            format!("of the dates {} `{}` counts", header.describe(&dates), header.name(date)),
+        );
+    }
+    Ok(Some(date))
+}
+
+/// Names of GPS weeks, in normal form.
+const WEEKS: [&str; 9] =
+    ["week", "weeks", "gps_week", "gpsweek", "week_number", "gps_week_number", "week_no", "wn", "wno"];
+
+/// The column of the weeks, beside times that by their name count within one.
+fn week_column(header: &HeaderColumns, time: usize) -> Option<usize> {
+    let name = plain_name(header, time);
+    let is_of_week =
+        name.starts_with("sec") || ["tow", "sow", "week", "gps"].iter().any(|part| name.contains(part));
+    let is_week = |&column: &usize| WEEKS.contains(&plain_name(header, column).as_str());
+    (0..header.0.len()).find(is_week).filter(|_| is_of_week)
+}
+
+/// The time of the measurement beside that of its message, as PX4 names it: `timestamp_sample`.
+fn sample_of(header: &HeaderColumns, table: &Table<'_>, time: usize, notes: &mut Vec<Note>) -> Option<usize> {
+    let name = plain_name(header, time) + "_sample";
+    let sample = (0..header.0.len()).find(|&column| plain_name(header, column) == name)?;
+    if is_constant(table, sample) {
+        return None;
+    }
+    push_information(
+        notes,
+        format!(
+            "of the times {} the one of the measurement counts: `{}`",
+            header.describe(&[time, sample]),
+            header.name(sample)
+        ),
+    );
+    Some(sample)
 }
 
 /// Whether a column holds one text in all of several rows.
@@ -140,8 +205,9 @@ fn stamps_of_the_measurement(header: &HeaderColumns, table: &Table<'_>, notes: &
             format!("of the times {} those that stand still do not count", header.describe(&all)),
         );
     }
+    let is_of_header = |stem: &str| stem.ends_with("header_stamp") || stem.ends_with("header_stamp_secs");
     let stamps: Vec<usize> =
-        times.iter().copied().filter(|&column| header.stem(column).ends_with("header_stamp")).collect();
+        times.iter().copied().filter(|&column| is_of_header(header.stem(column))).collect();
     if stamps.len() != 1 || times.len() == 1 {
         return times;
     }

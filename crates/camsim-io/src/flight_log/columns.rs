@@ -85,6 +85,8 @@ pub(super) struct TimeColumns {
     pub(super) integers_are_ns: bool,
     /// Column of dates that belong to clock times.
     pub(super) date: Option<usize>,
+    /// Column of the GPS weeks whose seconds the times are.
+    pub(super) week: Option<usize>,
     /// Column of nanoseconds that are added to whole seconds.
     pub(super) nanoseconds: Option<usize>,
 }

@@ -72,7 +72,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
         return Err(problem("no track point has a fix (`fix` is none): the receiver had none".to_owned()));
     }
     let rows = flown.iter().map(|point| raw_row(path, point, line(point))).collect::<Result<_, _>>()?;
-    Ok(RawLog { rows, notes })
+    Ok(RawLog { rows, notes, quaternions: None })
 }
 
 /// The points with a fix, of three dimensions where any has one.

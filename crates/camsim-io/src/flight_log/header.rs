@@ -2,7 +2,7 @@
 
 use super::{
     column_meaning::ColumnMeaning,
-    column_names, message_columns,
+    column_names, message_columns, split_stamps,
     units::{Dimension, Qualifier, Unit, VerticalDatum, parse_qualifier},
 };
 
@@ -46,6 +46,7 @@ impl HeaderColumns {
         let column = |name: &&str| HeaderColumn { name: (*name).to_owned(), parsed: parse_name(name, None) };
         let mut columns = names.iter().map(column).collect::<Vec<_>>();
         message_columns::apply(&mut columns);
+        split_stamps::apply(&mut columns);
         Self(columns)
     }
 

@@ -155,6 +155,7 @@ impl TableLayout {
                 unit_ns: None,
                 integers_are_ns: format == LogFormat::Euroc,
                 date: None,
+                week: None,
                 nanoseconds: None,
             },
             frame,

@@ -141,8 +141,11 @@ const RULES: &[(&str, &str)] = &[
     (
         "Times",
         "numbers; `h:m:s`, also with AM or PM, with a date column if there is one; ISO 8601 with `T` or a \
-            blank, `Z` or an offset. Dates are year-month-day. A clock that begins again (midnight, GPS \
-            week, 32 bit counters of us and ms) goes on, with a warning",
+            blank, `Z` or an offset. Dates are year-month-day, 8 digits, day.month.year, or day and month in \
+            either order where a number above 12 tells them apart; others give a warning, and times count from \
+            midnight. Weeks of GPS beside seconds of the week are added, without leap seconds. A clock that \
+            begins again (midnight, GPS week, 32 bit counters of us and ms) goes on, with a warning. Rows years \
+            before the others, of a clock that is not set yet, are left out, with a warning",
     ),
     (
         "Times in two columns under one name",

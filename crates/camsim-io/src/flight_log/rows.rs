@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use camsim_core::flight_log::Note;
+
 use super::{
     FlightLogError,
+    column_selection::push_warning,
     columns::{AttitudeColumns, FieldSource, Frame, format_name},
     layout::TableLayout,
     text_table::{self, Line, Table},
@@ -55,6 +58,7 @@ pub(super) fn read(
     path: &Path,
     table: &Table<'_>,
     layout: &TableLayout,
+    notes: &mut Vec<Note>,
 ) -> Result<ParsedRows, FlightLogError> {
     let mut fields = Vec::new();
     let mut time_format = None;
@@ -67,7 +71,20 @@ pub(super) fn read(
     }
     check_single_vehicle(path, table, layout)?;
     let is_clock = time_format == Some(TimeFormat::Clock);
-    let date = layout.time.date.filter(|&date| is_clock && !is_constant_text(table, date));
+    let date = layout.time.date.filter(|_| is_clock);
+    let unread = date.and_then(|date| constant_text(table, date));
+    if let Some((column, text)) = date.zip(unread).filter(|(_, text)| !text_table::is_missing(text)) {
+        push_warning(
+            notes,
+            format!(
+                "column {}{} holds dates that are not read (`{text}`): write year-month-day; the times count \
+                    from midnight",
+                column + 1,
+                layout.bracketed_name(column)
+            ),
+        );
+    }
+    let date = date.filter(|_| unread.is_none());
     let reader = RowReader {
         date,
         path,
@@ -121,15 +138,16 @@ fn check_single_vehicle(path: &Path, table: &Table<'_>, layout: &TableLayout) ->
     Ok(())
 }
 
-/// Whether a column holds one text throughout that is no date. Such dates are ignored.
-fn is_constant_text(table: &Table<'_>, column: usize) -> bool {
+/// The text that a column holds throughout, if it is no date. Such dates are not read.
+fn constant_text<'a>(table: &Table<'a>, column: usize) -> Option<&'a str> {
     let mut fields = Vec::new();
     let mut first = None;
-    table.rows.iter().all(|line| {
+    let is_constant = table.rows.iter().all(|line| {
         table.separator.split(line.text, &mut fields);
         let field = fields.get(column).copied().unwrap_or("");
         time_fields::date_ns(field).is_none() && *first.get_or_insert(field) == field
-    })
+    });
+    first.filter(|_| is_constant)
 }
 
 impl<'a> RowReader<'a> {

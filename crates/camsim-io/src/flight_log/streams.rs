@@ -76,7 +76,7 @@ impl Streams {
             quaternions::normalise(&mut rows, &mut self.notes).map_err(problem)?;
         }
         let rows = rows.iter().map(|row| raw_row(row, self.frame, self.kind)).collect();
-        Ok(RawLog { rows, notes: self.notes })
+        Ok(RawLog { rows, notes: self.notes, quaternions: None })
     }
 }
 

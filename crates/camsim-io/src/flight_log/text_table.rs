@@ -276,6 +276,12 @@ impl<'a> Table<'a> {
         number(field, self.has_decimal_commas)
     }
 
+    /// The first number of a column.
+    pub(super) fn first_number(&self, column: usize) -> Option<f64> {
+        let field = |row| self.fields(row).get(column).and_then(|field| self.number(field));
+        self.rows.iter().filter_map(field).find(|value| value.is_finite())
+    }
+
     /// Up to `count` rows, evenly spaced over the file.
     pub(super) fn sample(&self, count: usize) -> impl Iterator<Item = &Line<'a>> {
         self.rows.iter().step_by(self.rows.len().div_ceil(count).max(1))

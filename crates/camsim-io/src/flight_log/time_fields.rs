@@ -146,16 +146,37 @@ fn offset_ns(text: &str) -> Option<i128> {
     (hours <= 14 && minutes <= 59).then_some(sign * (hours * 60 + minutes) * 60_000_000_000)
 }
 
-/// Parses `2023-05-01`, also with slashes, dots or colons (photos), as nanoseconds from 1970 to the start of that day. Dates
-/// that begin with day or month are ambiguous, and `None`.
+/// Parses `2023-05-01`, also with slashes, dots or colons (photos), `20230501`, `01.05.2023` and, where a number
+/// above 12 says which one is the day, `5/13/2023`; as nanoseconds from 1970 to the start of that day. Other
+/// dates that begin with day or month are ambiguous, and `None`.
 pub(super) fn date_ns(field: &str) -> Option<i128> {
-    let separator = ['-', '/', '.', ':'].into_iter().find(|&c| field.matches(c).count() == 2)?;
-    let mut parts = field.split(separator);
-    let (year, month, day) = (parts.next()?, unsigned(parts.next()?, 2)?, unsigned(parts.next()?, 2)?);
+    let (year, month, day) = if field.len() == 8 && !field.contains(['-', '/', '.', ':']) {
+        (field.get(..4)?, field.get(4..6)?, field.get(6..)?)
+    } else {
+        let separator = ['-', '/', '.', ':'].into_iter().find(|&c| field.matches(c).count() == 2)?;
+        let mut parts = field.split(separator);
+        let parts = (parts.next()?, parts.next()?, parts.next()?);
+        if parts.0.len() == 4 { parts } else { year_last(parts, separator)? }
+    };
+    let (month, day) = (unsigned(month, 2)?, unsigned(day, 2)?);
     if year.len() != 4 || !(1..=12).contains(&month) || !(1..=31).contains(&day) {
         return None;
     }
     Some(days_from_1970(unsigned(year, 4)?, month, day) * DAY_NS)
+}
+
+/// Year, month and day of a date that ends with the year; `None` where day and month are ambiguous.
+fn year_last<'a>(
+    (first, second, year): (&'a str, &'a str, &'a str),
+    separator: char,
+) -> Option<(&'a str, &'a str, &'a str)> {
+    let (a, b) = (unsigned(first, 2)?, unsigned(second, 2)?);
+    match separator {
+        '.' => Some((year, second, first)),
+        '-' | '/' if a > 12 || a == b => Some((year, second, first)),
+        '-' | '/' if b > 12 => Some((year, first, second)),
+        _ => None,
+    }
 }
 
 /// Days from 1970-01-01 in the Gregorian calendar. Years begin in March here, so that a leap day is the last

@@ -424,7 +424,7 @@ fn random_texts_do_not_panic() {
             let spec = FlightSpec { format, ..track() };
             let mut notes = Vec::new();
             if let Ok(layout) = TableLayout::detect(Path::new("any"), &table, &spec, &mut notes) {
-                let _ = rows::read(Path::new("any"), &table, &layout);
+                let _ = rows::read(Path::new("any"), &table, &layout, &mut Vec::new());
             }
         }
     }

@@ -158,11 +158,11 @@ fn times_in_parts_and_vehicles_are_read_or_refused() {
         "a date that never changes",
         &log_with_times("date,time", &|i| format!("1.5.23,10:00:{i:02}")),
         &track(),
-        "",
+        "holds dates that are not read (`1.5.23`)",
     );
     assert_refused(
         "dates day first",
-        log_with_times("date,time", &|i| format!("{}.5.2023,10:00:{i:02}", 1 + i / 10)).as_bytes(),
+        log_with_times("date,time", &|i| format!("{}/5/2023,10:00:{i:02}", 1 + i / 10)).as_bytes(),
         &track(),
         &["column 1 (`date`)", "year-month-day"],
     );
