@@ -70,6 +70,7 @@ mod quaternions;
 mod receiver_logs;
 mod reference;
 mod row_selection;
+mod row_states;
 mod rows;
 mod scalars;
 mod sparse_rows;
@@ -222,6 +223,8 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     row_selection::keep_rows(&mut table, &layout, &mut notes).map_err(problem)?;
     let mut rows = rows::read(path, &table, &layout)?;
+    row_states::keep_one_track(&mut table, &layout, &mut rows.rows, &mut notes);
+    row_states::warn_of_states(&table, &layout, &rows.rows, &mut notes);
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
     let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
     angle_unit::angles_to_degrees(&mut rows, &layout, spec, &mut notes).map_err(problem)?;

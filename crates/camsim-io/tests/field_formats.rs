@@ -338,6 +338,111 @@ fn one_receiver_and_its_fixes_are_kept() {
 }
 
 #[test]
+fn rows_of_bad_states_are_left_out() {
+    let fixes = data("09-csv-fix-type/L53b_fixtype_slow.csv");
+    let named = |name: &str, bad: &str, good: &str| {
+        let values = [(",1,5.0", format!(",{bad},5.0")), (",3,5.0", format!(",{good},5.0"))];
+        values.iter().fold(fixes.replace("fix_type", name), |text, (from, to)| text.replace(from, to))
+    };
+    let flight = |notes| Flight {
+        rows: 51,
+        seconds: 5.0,
+        velocity_m_s: [7.04, 13.26, -1.0],
+        yaw_pitch_roll_deg: Some([62.0, 2.0, 5.0]),
+        notes,
+        ..USUAL
+    };
+    let invalid: &[&str] = &["10 rows have no valid position by column 5"];
+    let unused: &[&str] = &["10 rows are not in use by column 5"];
+    let cases = [
+        ("GPS Fix Status", "NoFix", "3DDiff", invalid),
+        ("status", "-1", "2", invalid),
+        ("navStatus", "V", "A", invalid),
+        ("quality", "NO_FIX", "RTK_INT", invalid),
+        ("pos_type", "NONE", "NARROW_INT", invalid),
+        ("tracking_state", "LOST", "OK", invalid),
+        ("lost", "true", "false", invalid),
+        ("Q", "0", "5", invalid),
+        ("used", "0", "1", unused),
+        ("in_use", "false", "true", unused),
+        ("gps_used", "no", "yes", unused),
+        ("primary", "0", "1", unused),
+        ("healthy", "0", "1", &["10 rows have no fix by column 5"]),
+        ("num_sats", "0", "14", &["10 rows have no satellites by column 5"]),
+        ("fix_type", "0x00", "0x03", &["10 rows have no three-dimensional fix by column 5"]),
+    ];
+    for (name, bad, good, notes) in cases {
+        check_all(vec![(name, named(name, bad, good), msl(), Ok(flight(notes)))]);
+    }
+    // States that say nothing certain, or that all rows share, change nothing.
+    let all = |name: &str, value: &str| read(&named(name, value, value), &msl()).unwrap();
+    let without = read(&named("remark", "1", "3"), &msl()).unwrap();
+    for (name, value, words) in [
+        ("used", "0", "61 of 61 rows are not in use: it is not applied"),
+        ("num_sats", "0", "61 of 61 rows have no satellites: it is not applied"),
+        ("mode", "AUTO", ""),
+        ("status", "3", ""),
+        ("Q", "0.013", ""),
+    ] {
+        let log = all(name, value);
+        assert_eq!(log.rows, without.rows, "{name}");
+        let texts: Vec<&str> = log.notes.iter().map(|note| &*note.text).collect();
+        assert!(texts.iter().any(|text| text.contains(words)) || words.is_empty(), "{name}: {texts:?}");
+        assert_eq!(texts.len(), without.notes.len() + usize::from(!words.is_empty()), "{name}: {texts:?}");
+    }
+}
+
+/// Rows of two receivers, 30 m apart, with a column about them; `offset_s` is the time between them.
+fn two_receivers(name: &str, values: [&str; 2], offset_s: f64) -> String {
+    let mut text = format!("t,{name},lat,lon,alt\n");
+    for row in 0..122 {
+        let (which, t_s) = (row % 2, 0.1 * f64::from(row / 2));
+        let north_m = 7.5 * t_s + 30.0 * f64::from(which);
+        text += &format!(
+            "{:.3},{},{:.8},{:.8},{:.2}\n",
+            t_s + offset_s * f64::from(which),
+            values[usize::from(which == 1)],
+            47.05 + north_m / 111_180.0,
+            8.31 + 13.0 * t_s / 76_055.0,
+            480.0 + t_s
+        );
+    }
+    text
+}
+
+#[test]
+fn a_column_that_tells_interleaved_tracks_apart_numbers_receivers() {
+    let flight = |notes| Flight { notes, ..without_attitude() };
+    let first: &[&str] = &["(61 rows): those of `0` count, and 61 rows are left out"];
+    let named: &[&str] = &["`/gps0/fix` (61 rows) and `/gps1/fix` (61 rows): those of `/gps0/fix` count"];
+    let used = lines(&two_receivers("gps", ["0", "1"], 0.0), |index, line| match index {
+        0 => format!("{line},used"),
+        _ => format!("{line},{}", u8::from(line.split(',').nth(1) == Some("1"))),
+    });
+    // One flight, whose cameras fire in turn.
+    let in_turn = lines(&two_receivers("camera", ["left", "right"], 0.05), |index, line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if index > 0 {
+            let t_s: f64 = cells[0].parse().unwrap();
+            cells[2] = format!("{:.8}", 47.05 + 7.5 * t_s / 111_180.0);
+            cells[3] = format!("{:.8}", 8.31 + 13.0 * t_s / 76_055.0);
+            cells[4] = format!("{:.2}", 480.0 + t_s);
+        }
+        cells.join(",")
+    });
+    let all = Flight { rows: 122, seconds: 6.05, tolerance_m_s: 0.3, ..without_attitude() };
+    check_all(vec![
+        ("antenna", two_receivers("antenna", ["0", "1"], 0.0), track(msl()), Ok(flight(first))),
+        ("gps", two_receivers("gps", ["0", "1"], 0.0), track(msl()), Ok(flight(first))),
+        ("id", two_receivers("id", ["0", "1"], 0.0), track(msl()), Ok(flight(first))),
+        ("sensor", two_receivers("sensor", ["0", "1"], 0.05), track(msl()), Ok(flight(first))),
+        ("topic", two_receivers("topic", ["/gps0/fix", "/gps1/fix"], 0.05), track(msl()), Ok(flight(named))),
+        ("used", used, track(msl()), Ok(flight(&["61 rows are not in use by column 6"]))),
+        ("in turn", in_turn, track(msl()), Ok(all)),
+    ]);
+}
+
+#[test]
 fn clocks_of_several_kinds_are_read() {
     let two = data("13-rostopic-two-times/L22_rostopic.csv");
     let tum = FlightSpec { format: LogFormat::Tum, ..ellipsoid() };
