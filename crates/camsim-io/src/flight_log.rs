@@ -51,6 +51,7 @@ mod dataflash;
 mod detect;
 mod error;
 mod foreign_formats;
+mod frame_columns;
 mod gpx;
 mod header;
 mod header_lines;
@@ -231,6 +232,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     if let AttitudeColumns::Quaternion(_) = layout.attitude {
         quaternions::normalise(&mut rows.rows, &mut notes).map_err(problem)?;
     }
+    let frame = frame_columns::apply(&table, &layout, &mut rows.rows, &mut notes).map_err(problem)?;
     if rows.time_format == time_fields::TimeFormat::Number {
         for row in &mut rows.rows {
             row.time = row.time.and_then(|time| time_fields::to_ns(time, unit_ns)).map(i128::from);
@@ -258,7 +260,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         });
     }
     let kind = layout.attitude.kind();
-    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect(), notes })
+    Ok(RawLog { rows: rows.rows.iter().map(|row| raw_row(row, frame, kind)).collect(), notes })
 }
 
 /// Rotation by half a turn about x, which negates y and z.

@@ -13,7 +13,7 @@ use camsim_core::{
     },
 };
 use camsim_io::flight_log::read_flight_log;
-use glam::{DVec3, EulerRot};
+use glam::{DQuat, DVec3, EulerRot};
 
 fn ellipsoid() -> FlightSpec {
     FlightSpec {
@@ -163,6 +163,8 @@ fn solutions_of_rtklib_are_read() {
             .replace("lat/lon/height=WGS84/ellipsoidal", "e/n/u-baseline=WGS84"),
         false => in_meters(line),
     });
+    let from_place = format!("% ref pos   :  47.05  8.31  500.0\n{baseline}");
+    let place: &[&str] = &["line 1 says", "set flight.origin = [47.05, 8.31, 500.0]"];
     let earth = blanks.replace("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)");
     let in_parts = lines(&blanks, |_, line| match line.starts_with('%') {
         true => line.replace("(deg)", "(d'\")"),
@@ -178,6 +180,12 @@ fn solutions_of_rtklib_are_read() {
         ("commas", commas.clone(), track(ellipsoid()), Ok(without_attitude())),
         ("commas, UTC", commas.replace("GPST,", "UTC,"), track(ellipsoid()), Ok(without_attitude())),
         ("baseline", baseline, track(ellipsoid()), Ok(without_attitude())),
+        (
+            "baseline from a place",
+            from_place,
+            track(ellipsoid()),
+            Ok(Flight { notes: place, ..without_attitude() }),
+        ),
         (
             "from the centre of the Earth",
             earth,
@@ -279,12 +287,30 @@ fn tables_of_messages_are_read() {
         format!("{line},{more}")
     });
     let near = || Flight { tolerance_m_s: 0.2, notes: merged, ..USUAL };
+    let mut of_two = "timestamp,GPS.Lat,GPS.Lng,GPS.Alt,GPS.U,GPS2.Lat,GPS2.Lng,GPS2.Alt,GPS2.U\n".to_owned();
+    for row in 0..61 {
+        let t_s = 0.1 * f64::from(row);
+        let place = |t_s: f64| {
+            let (lat, lon) = (47.05 + 7.5 * t_s / 111_180.0, 8.31 + 13.0 * t_s / 76_055.0);
+            format!("{lat:.8},{lon:.8},{:.2}", 480.0 + t_s)
+        };
+        of_two += &format!("{:.2},{},0,,,,\n", 1_683_194_400.0 + t_s, place(t_s));
+        of_two += &format!("{:.2},,,,,{},1\n", 1_683_194_400.01 + t_s, place(t_s));
+    }
+    let other: &[&str] =
+        &["(`GPS2.U`) says that its receiver was: remove the columns of `GPS`", "61 rows state neither"];
     check_all(vec![
         ("MAVLink", messages.clone(), msl(), Ok(near())),
         ("MAVLink, semicolons", messages.replace(',', ";"), msl(), Ok(near())),
         ("raw", gps_raw, msl(), Ok(near())),
         ("further messages", extended, msl(), Ok(near())),
         ("ArduPilot", plain, msl(), Ok(near())),
+        (
+            "ArduPilot, the other in use",
+            of_two,
+            track(msl()),
+            Ok(Flight { notes: other, ..without_attitude() }),
+        ),
     ]);
 }
 
@@ -440,6 +466,68 @@ fn a_column_that_tells_interleaved_tracks_apart_numbers_receivers() {
         ("used", used, track(msl()), Ok(flight(&["61 rows are not in use by column 6"]))),
         ("in turn", in_turn, track(msl()), Ok(all)),
     ]);
+}
+
+#[test]
+fn columns_of_frames_state_axes() {
+    // A flight as `frames` have it: `turn` takes vectors of north-east-down and of bodies to their axes.
+    let poses = |frames: [&str; 2], header: [&str; 2], world: DQuat, body: DQuat| {
+        let mut text = format!("Time,{},{},", header[0], header[1]);
+        text += "pose.pose.position.x,pose.pose.position.y,pose.pose.position.z,";
+        text += "pose.pose.orientation.x,pose.pose.orientation.y,pose.pose.orientation.z,pose.pose.orientation.w\n";
+        let attitude =
+            DQuat::from_euler(EulerRot::ZYX, 60_f64.to_radians(), 2_f64.to_radians(), 5_f64.to_radians());
+        let [x, y, z, w] = (world * attitude * body.inverse()).to_array();
+        for row in 0..61 {
+            let t_s = 0.1 * f64::from(row);
+            let p = world * (DVec3::new(7.5, 13.0, -1.0) * t_s);
+            text += &format!(
+                "{:.1},{},{},{:.4},{:.4},{:.4},{x},{y},{z},{w}\n",
+                1_683_194_400.0 + t_s,
+                frames[0],
+                frames[1],
+                p.x,
+                p.y,
+                p.z
+            );
+        }
+        text
+    };
+    let ros = ["header.frame_id", "child_frame_id"];
+    let tum = || FlightSpec { format: LogFormat::Tum, ..ellipsoid() };
+    let csv_ned = FlightSpec { format: LogFormat::CsvNed, ..ellipsoid() };
+    let contradiction: &[&str] =
+        &["(`header.frame_id`) says `map_enu`", "but positions are read as north-east-down"];
+    let (enu, flu) = (
+        DQuat::from_xyzw(std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0),
+        DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0),
+    );
+    let stated: &[&str] = &["read as north-east-down and forward-right-down, as the names say"];
+    let of_body: &[&str] = &["its body is read as forward-right-down"];
+    let usual = Flight { velocity_m_s: [7.5, 13.0, -1.0], ..USUAL };
+    let case = |frames, header, world, body, notes| {
+        (poses(frames, header, world, body), tum(), Ok(Flight { notes, ..usual }))
+    };
+    let ned = DQuat::IDENTITY;
+    let cases = [
+        case(["odom_ned", "base_link_frd"], ros, ned, ned, stated),
+        case(
+            ["/odom_ned", "base_link_frd"],
+            ["odom/header/frame_id", "odom/child_frame_id"],
+            ned,
+            ned,
+            stated,
+        ),
+        case(["odom_ned", "base_link"], ros, ned, ned, of_body),
+        case(["odom", "base_link"], ros, enu, flu, &[]),
+        (
+            poses(["map_enu", "base_link"], ros, ned, ned),
+            csv_ned,
+            Ok(Flight { notes: contradiction, ..usual }),
+        ),
+        (poses(["earth", "base_link"], ros, enu, flu), tum(), Err(&["`earth`", "geocentric"][..])),
+    ];
+    check_all(cases.into_iter().map(|(text, spec, expected)| ("frames", text, spec, expected)).collect());
 }
 
 #[test]

@@ -312,13 +312,35 @@ fn keep_good(
         if !judgement.is_vague() {
             return Err(format!("{problem}, so there is no flight: remove the column if that is not so"));
         }
-        push_warning(notes, format!("{problem}: it is not applied, for no flight would be left"));
+        let other = other_in_use(table, layout, column, judgement);
+        push_warning(notes, format!("{problem}: it is not applied, for no flight would be left{other}"));
         return Ok(());
     }
+    let other = other_in_use(table, layout, column, judgement);
     let keeps: Vec<bool> = judged.iter().map(|counts| *counts != Some(false)).collect();
     retain(table, &keeps);
-    push_warning(notes, format!("{left_out} rows {lack} by {name}, and are left out"));
+    push_warning(notes, format!("{left_out} rows {lack} by {name}, and are left out{other}"));
     Ok(())
+}
+
+/// Names another message of a merged table whose receiver was in use, as `GPS2.U` beside `GPS.U` says.
+fn other_in_use(table: &Table<'_>, layout: &TableLayout, column: usize, judgement: Judgement) -> String {
+    let parts = |column: usize| layout.names.get(column).and_then(|name| name.rsplit_once('.'));
+    let Some((message, field)) = parts(column).filter(|_| judgement == Judgement::InUse) else {
+        return String::new();
+    };
+    let is_used = |&other: &usize| {
+        other != column
+            && parts(other).is_some_and(|(_, other)| other == field)
+            && (0..table.rows.len()).any(|row| flag(field_of(table, row, other)) == Some(true))
+    };
+    (0..layout.names.len()).find(is_used).map_or(String::new(), |other| {
+        format!(
+            "; column {}{} says that its receiver was: remove the columns of `{message}` to fly it",
+            other + 1,
+            layout.bracketed_name(other)
+        )
+    })
 }
 
 pub(super) fn retain(table: &mut Table<'_>, keeps: &[bool]) {
