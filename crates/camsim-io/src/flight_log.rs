@@ -51,6 +51,7 @@ mod dataflash;
 mod detect;
 mod error;
 mod foreign_formats;
+mod frame_columns;
 mod gpx;
 mod header;
 mod header_lines;
@@ -70,6 +71,7 @@ mod quaternions;
 mod receiver_logs;
 mod reference;
 mod row_selection;
+mod row_states;
 mod rows;
 mod scalars;
 mod sparse_rows;
@@ -226,12 +228,15 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
     row_selection::keep_rows(&mut table, &layout, &mut notes).map_err(problem)?;
     let mut rows = rows::read(path, &table, &layout, &mut notes)?;
+    row_states::keep_one_track(&mut table, &layout, &mut rows.rows, &mut notes);
+    row_states::warn_of_states(&table, &layout, &rows.rows, &mut notes);
     angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
     let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
     angle_unit::angles_to_degrees(&mut rows, &layout, spec, &mut notes).map_err(problem)?;
     if let AttitudeColumns::Quaternion(_) = layout.attitude {
         quaternions::normalise(&mut rows.rows, &mut notes).map_err(problem)?;
     }
+    let frame = frame_columns::apply(&table, &layout, &mut rows.rows, &mut notes).map_err(problem)?;
     if rows.time_format == time_fields::TimeFormat::Number {
         for row in &mut rows.rows {
             row.time = row.time.and_then(|time| time_fields::to_ns(time, unit_ns)).map(i128::from);
@@ -267,11 +272,11 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     let quaternions = match layout.attitude {
         AttitudeColumns::Quaternion([x, _, _, w]) => Some(attitude_check::QuaternionReading {
             is_scalar_first: w < x,
-            is_enu: layout.frame == Frame::EastNorthUp,
+            is_enu: frame == Frame::EastNorthUp,
         }),
         _ => None,
     };
-    let rows = rows.rows.iter().map(|row| raw_row(row, layout.frame, kind)).collect();
+    let rows = rows.rows.iter().map(|row| raw_row(row, frame, kind)).collect();
     Ok(RawLog { rows, notes, quaternions })
 }
 

@@ -13,7 +13,7 @@ use camsim_core::{
     },
 };
 use camsim_io::flight_log::read_flight_log;
-use glam::{DVec3, EulerRot};
+use glam::{DQuat, DVec3, EulerRot};
 
 fn ellipsoid() -> FlightSpec {
     FlightSpec {
@@ -163,6 +163,8 @@ fn solutions_of_rtklib_are_read() {
             .replace("lat/lon/height=WGS84/ellipsoidal", "e/n/u-baseline=WGS84"),
         false => in_meters(line),
     });
+    let from_place = format!("% ref pos   :  47.05  8.31  500.0\n{baseline}");
+    let place: &[&str] = &["line 1 says", "set flight.origin = [47.05, 8.31, 500.0]"];
     let earth = blanks.replace("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)");
     let in_parts = lines(&blanks, |_, line| match line.starts_with('%') {
         true => line.replace("(deg)", "(d'\")"),
@@ -183,6 +185,12 @@ fn solutions_of_rtklib_are_read() {
         ("commas", commas.clone(), track(ellipsoid()), Ok(without_attitude())),
         ("commas, UTC", commas.replace("GPST,", "UTC,"), track(ellipsoid()), Ok(without_attitude())),
         ("baseline", baseline, track(ellipsoid()), Ok(without_attitude())),
+        (
+            "baseline from a place",
+            from_place,
+            track(ellipsoid()),
+            Ok(Flight { notes: place, ..without_attitude() }),
+        ),
         (
             "from the centre of the Earth",
             earth,
@@ -284,12 +292,30 @@ fn tables_of_messages_are_read() {
         format!("{line},{more}")
     });
     let near = || Flight { tolerance_m_s: 0.2, notes: merged, ..USUAL };
+    let mut of_two = "timestamp,GPS.Lat,GPS.Lng,GPS.Alt,GPS.U,GPS2.Lat,GPS2.Lng,GPS2.Alt,GPS2.U\n".to_owned();
+    for row in 0..61 {
+        let t_s = 0.1 * f64::from(row);
+        let place = |t_s: f64| {
+            let (lat, lon) = (47.05 + 7.5 * t_s / 111_180.0, 8.31 + 13.0 * t_s / 76_055.0);
+            format!("{lat:.8},{lon:.8},{:.2}", 480.0 + t_s)
+        };
+        of_two += &format!("{:.2},{},0,,,,\n", 1_683_194_400.0 + t_s, place(t_s));
+        of_two += &format!("{:.2},,,,,{},1\n", 1_683_194_400.01 + t_s, place(t_s));
+    }
+    let other: &[&str] =
+        &["(`GPS2.U`) says that its receiver was: remove the columns of `GPS`", "61 rows state neither"];
     check_all(vec![
         ("MAVLink", messages.clone(), msl(), Ok(near())),
         ("MAVLink, semicolons", messages.replace(',', ";"), msl(), Ok(near())),
         ("raw", gps_raw, msl(), Ok(near())),
         ("further messages", extended, msl(), Ok(near())),
         ("ArduPilot", plain, msl(), Ok(near())),
+        (
+            "ArduPilot, the other in use",
+            of_two,
+            track(msl()),
+            Ok(Flight { notes: other, ..without_attitude() }),
+        ),
     ]);
 }
 
@@ -340,6 +366,173 @@ fn one_receiver_and_its_fixes_are_kept() {
         ("ROS", status, msl(), Ok(fixed(&["10 rows have no fix by column 5 (`status.status`)"]))),
         ("never a fix", fixes.replace(",3,5.0", ",2,5.0"), msl(), Err(&["fix_type", "remove the column"])),
     ]);
+}
+
+#[test]
+fn rows_of_bad_states_are_left_out() {
+    let fixes = data("09-csv-fix-type/L53b_fixtype_slow.csv");
+    let named = |name: &str, bad: &str, good: &str| {
+        let values = [(",1,5.0", format!(",{bad},5.0")), (",3,5.0", format!(",{good},5.0"))];
+        values.iter().fold(fixes.replace("fix_type", name), |text, (from, to)| text.replace(from, to))
+    };
+    let flight = |notes| Flight {
+        rows: 51,
+        seconds: 5.0,
+        velocity_m_s: [7.04, 13.26, -1.0],
+        yaw_pitch_roll_deg: Some([62.0, 2.0, 5.0]),
+        notes,
+        ..USUAL
+    };
+    let invalid: &[&str] = &["10 rows have no valid position by column 5"];
+    let unused: &[&str] = &["10 rows are not in use by column 5"];
+    let cases = [
+        ("GPS Fix Status", "NoFix", "3DDiff", invalid),
+        ("status", "-1", "2", invalid),
+        ("navStatus", "V", "A", invalid),
+        ("quality", "NO_FIX", "RTK_INT", invalid),
+        ("pos_type", "NONE", "NARROW_INT", invalid),
+        ("tracking_state", "LOST", "OK", invalid),
+        ("lost", "true", "false", invalid),
+        ("Q", "0", "5", invalid),
+        ("used", "0", "1", unused),
+        ("in_use", "false", "true", unused),
+        ("gps_used", "no", "yes", unused),
+        ("primary", "0", "1", unused),
+        ("healthy", "0", "1", &["10 rows have no fix by column 5"]),
+        ("num_sats", "0", "14", &["10 rows have no satellites by column 5"]),
+        ("fix_type", "0x00", "0x03", &["10 rows have no three-dimensional fix by column 5"]),
+    ];
+    for (name, bad, good, notes) in cases {
+        check_all(vec![(name, named(name, bad, good), msl(), Ok(flight(notes)))]);
+    }
+    // States that say nothing certain, or that all rows share, change nothing.
+    let all = |name: &str, value: &str| read(&named(name, value, value), &msl()).unwrap();
+    let without = read(&named("remark", "1", "3"), &msl()).unwrap();
+    for (name, value, words) in [
+        ("used", "0", "61 of 61 rows are not in use: it is not applied"),
+        ("num_sats", "0", "61 of 61 rows have no satellites: it is not applied"),
+        ("mode", "AUTO", ""),
+        ("status", "3", ""),
+        ("Q", "0.013", ""),
+    ] {
+        let log = all(name, value);
+        assert_eq!(log.rows, without.rows, "{name}");
+        let texts: Vec<&str> = log.notes.iter().map(|note| &*note.text).collect();
+        assert!(texts.iter().any(|text| text.contains(words)) || words.is_empty(), "{name}: {texts:?}");
+        assert_eq!(texts.len(), without.notes.len() + usize::from(!words.is_empty()), "{name}: {texts:?}");
+    }
+}
+
+/// Rows of two receivers, 30 m apart, with a column about them; `offset_s` is the time between them.
+fn two_receivers(name: &str, values: [&str; 2], offset_s: f64) -> String {
+    let mut text = format!("t,{name},lat,lon,alt\n");
+    for row in 0..122 {
+        let (which, t_s) = (row % 2, 0.1 * f64::from(row / 2));
+        let north_m = 7.5 * t_s + 30.0 * f64::from(which);
+        text += &format!(
+            "{:.3},{},{:.8},{:.8},{:.2}\n",
+            t_s + offset_s * f64::from(which),
+            values[usize::from(which == 1)],
+            47.05 + north_m / 111_180.0,
+            8.31 + 13.0 * t_s / 76_055.0,
+            480.0 + t_s
+        );
+    }
+    text
+}
+
+#[test]
+fn a_column_that_tells_interleaved_tracks_apart_numbers_receivers() {
+    let flight = |notes| Flight { notes, ..without_attitude() };
+    let first: &[&str] = &["(61 rows): those of `0` count, and 61 rows are left out"];
+    let named: &[&str] = &["`/gps0/fix` (61 rows) and `/gps1/fix` (61 rows): those of `/gps0/fix` count"];
+    let used = lines(&two_receivers("gps", ["0", "1"], 0.0), |index, line| match index {
+        0 => format!("{line},used"),
+        _ => format!("{line},{}", u8::from(line.split(',').nth(1) == Some("1"))),
+    });
+    // One flight, whose cameras fire in turn.
+    let in_turn = lines(&two_receivers("camera", ["left", "right"], 0.05), |index, line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if index > 0 {
+            let t_s: f64 = cells[0].parse().unwrap();
+            cells[2] = format!("{:.8}", 47.05 + 7.5 * t_s / 111_180.0);
+            cells[3] = format!("{:.8}", 8.31 + 13.0 * t_s / 76_055.0);
+            cells[4] = format!("{:.2}", 480.0 + t_s);
+        }
+        cells.join(",")
+    });
+    let all = Flight { rows: 122, seconds: 6.05, tolerance_m_s: 0.3, ..without_attitude() };
+    check_all(vec![
+        ("antenna", two_receivers("antenna", ["0", "1"], 0.0), track(msl()), Ok(flight(first))),
+        ("gps", two_receivers("gps", ["0", "1"], 0.0), track(msl()), Ok(flight(first))),
+        ("id", two_receivers("id", ["0", "1"], 0.0), track(msl()), Ok(flight(first))),
+        ("sensor", two_receivers("sensor", ["0", "1"], 0.05), track(msl()), Ok(flight(first))),
+        ("topic", two_receivers("topic", ["/gps0/fix", "/gps1/fix"], 0.05), track(msl()), Ok(flight(named))),
+        ("used", used, track(msl()), Ok(flight(&["61 rows are not in use by column 6"]))),
+        ("in turn", in_turn, track(msl()), Ok(all)),
+    ]);
+}
+
+#[test]
+fn columns_of_frames_state_axes() {
+    // A flight as `frames` have it: `turn` takes vectors of north-east-down and of bodies to their axes.
+    let poses = |frames: [&str; 2], header: [&str; 2], world: DQuat, body: DQuat| {
+        let mut text = format!("Time,{},{},", header[0], header[1]);
+        text += "pose.pose.position.x,pose.pose.position.y,pose.pose.position.z,";
+        text += "pose.pose.orientation.x,pose.pose.orientation.y,pose.pose.orientation.z,pose.pose.orientation.w\n";
+        let attitude =
+            DQuat::from_euler(EulerRot::ZYX, 60_f64.to_radians(), 2_f64.to_radians(), 5_f64.to_radians());
+        let [x, y, z, w] = (world * attitude * body.inverse()).to_array();
+        for row in 0..61 {
+            let t_s = 0.1 * f64::from(row);
+            let p = world * (DVec3::new(7.5, 13.0, -1.0) * t_s);
+            text += &format!(
+                "{:.1},{},{},{:.4},{:.4},{:.4},{x},{y},{z},{w}\n",
+                1_683_194_400.0 + t_s,
+                frames[0],
+                frames[1],
+                p.x,
+                p.y,
+                p.z
+            );
+        }
+        text
+    };
+    let ros = ["header.frame_id", "child_frame_id"];
+    let tum = || FlightSpec { format: LogFormat::Tum, ..ellipsoid() };
+    let csv_ned = FlightSpec { format: LogFormat::CsvNed, ..ellipsoid() };
+    let contradiction: &[&str] =
+        &["(`header.frame_id`) says `map_enu`", "but positions are read as north-east-down"];
+    let (enu, flu) = (
+        DQuat::from_xyzw(std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0),
+        DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0),
+    );
+    let stated: &[&str] = &["read as north-east-down and forward-right-down, as the names say"];
+    let of_body: &[&str] = &["its body is read as forward-right-down"];
+    let usual = Flight { velocity_m_s: [7.5, 13.0, -1.0], ..USUAL };
+    let case = |frames, header, world, body, notes| {
+        (poses(frames, header, world, body), tum(), Ok(Flight { notes, ..usual }))
+    };
+    let ned = DQuat::IDENTITY;
+    let cases = [
+        case(["odom_ned", "base_link_frd"], ros, ned, ned, stated),
+        case(
+            ["/odom_ned", "base_link_frd"],
+            ["odom/header/frame_id", "odom/child_frame_id"],
+            ned,
+            ned,
+            stated,
+        ),
+        case(["odom_ned", "base_link"], ros, ned, ned, of_body),
+        case(["odom", "base_link"], ros, enu, flu, &[]),
+        (
+            poses(["map_enu", "base_link"], ros, ned, ned),
+            csv_ned,
+            Ok(Flight { notes: contradiction, ..usual }),
+        ),
+        (poses(["earth", "base_link"], ros, enu, flu), tum(), Err(&["`earth`", "geocentric"][..])),
+    ];
+    check_all(cases.into_iter().map(|(text, spec, expected)| ("frames", text, spec, expected)).collect());
 }
 
 #[test]

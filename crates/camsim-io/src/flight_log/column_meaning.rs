@@ -64,14 +64,32 @@ pub(super) enum ColumnMeaning {
     HeightDatum,
 }
 
+impl FixCode {
+    /// Whether a column of such a name may be something else, or be left unused by the program that wrote it:
+    /// it never excludes all rows, and values that are not known exclude none.
+    pub(super) fn is_vague(self) -> bool {
+        !matches!(self, Self::Dimensions | Self::NonZero | Self::NonNegative)
+    }
+}
+
 /// Code of the quality of a fix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum FixCode {
     /// 0 and 1: none; 2: two-dimensional, its height is none; from 3 on: three-dimensional. MAVLink, PX4,
     /// u-blox, GoPro, ArduPilot.
     Dimensions,
-    /// 0: none; any other: one. NMEA, RTKLIB, flags.
+    /// 0: none; any other: one. NMEA, flags.
     NonZero,
     /// Below 0: none. NavSatFix of ROS.
     NonNegative,
+    /// 0: none; 1 to 9: one. RTKLIB's `Q`, which elsewhere is a rate.
+    Rtklib,
+    /// Number of satellites.
+    Satellites,
+    /// Flags that are set where there is no position.
+    Negated,
+    /// Words, and numbers below 0 for none; other numbers differ between programs.
+    Words,
+    /// Codes that differ between programs, or measures of accuracy.
+    Unknown,
 }

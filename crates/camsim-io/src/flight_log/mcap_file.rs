@@ -29,8 +29,8 @@ use super::{
 };
 
 mod cdr;
-mod frames;
-mod messages;
+pub(super) mod frames;
+pub(super) mod messages;
 mod records;
 mod tree;
 

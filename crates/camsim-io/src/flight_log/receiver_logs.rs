@@ -1,10 +1,10 @@
 //! Logs of receivers as text, whose lines are messages and no rows of one table.
 
 const NOVATEL: (&str, &str) = (
-    "a NovAtel log as text (#INSPVAXA,...)",
-    "write one row for each message, of its fields behind the semicolon, below a header such as \
-        t_s,lat_deg,lon_deg,alt_msl_m,roll_deg,pitch_deg,yaw_deg (INSPVAX: the time is the second of the week \
-        before the semicolon, the yaw is the azimuth)",
+    "a NovAtel log as text (#BESTPOSA,... or #INSPVAXA,...)",
+    "write one row for each message: the second of the week before the semicolon, and fields behind it, below a \
+        header such as t_s,lat_deg,lon_deg,alt_msl_m (BESTPOS; attitude = \"track\" then), or with \
+        roll_deg,pitch_deg,yaw_deg, too (INSPVA, INSPVAX: the yaw is the azimuth)",
 );
 const VECTORNAV: (&str, &str) = (
     "messages of a VectorNav sensor ($VN...)",

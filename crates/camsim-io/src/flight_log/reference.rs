@@ -210,11 +210,18 @@ const RULES: &[(&str, &str)] = &[
             log does not say, the first is flown with a warning that lists them",
     ),
     (
-        "Frames (mcap)",
+        "Frames",
         "three letters in the name of a frame are its axes: `odom_ned`, `local_origin_ned`, `map_nwu`, \
             `base_link_frd`, `fcu_frd`; an `optical` child looks along z, and is turned to a body that does \
             (camera.mount counts from there). Transforms (`/tf#base_link`) are composed to the root, between \
-            instants; the frame of another topic that has a pose in a parent gives a warning",
+            instants; the frame of another topic that has a pose in a parent gives a warning. Columns `frame_id` \
+            and `child_frame_id` of tables with x, y, z count as such names",
+    ),
+    (
+        "Interleaved receivers",
+        "where a column of any name (`sensor`, `topic`, `id`) has up to eight values whose rows alternate, and each \
+            value's rows make a much shorter way than all rows in turn, those of the lowest value count; the \
+            others are left out and counted",
     ),
     (
         "Fixes",

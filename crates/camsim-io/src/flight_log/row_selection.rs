@@ -13,9 +13,9 @@ use super::{
 };
 
 /// With more values than this a column counts something else than receivers.
-const MAX_RECEIVERS: usize = 8;
+pub(super) const MAX_RECEIVERS: usize = 8;
 /// Fewer rows are no flight.
-const MIN_ROWS: usize = 2;
+pub(super) const MIN_ROWS: usize = 2;
 
 /// Removes the rows that the columns of receivers and fixes exclude, with notes.
 ///
@@ -26,11 +26,50 @@ pub(super) fn keep_rows(
     layout: &TableLayout,
     notes: &mut Vec<Note>,
 ) -> Result<(), String> {
-    keep_one_receiver(table, layout, notes);
-    for &(column, code) in &layout.fixes {
-        keep_fixes(table, layout, (column, code), notes)?;
+    if let Some(column) = layout.receiver {
+        keep_one_receiver(table, layout, column, notes);
+    }
+    let in_use = layout.in_use.map(|column| (column, Judgement::InUse));
+    let fixes = layout.fixes.iter().map(|&(column, code)| (column, Judgement::Fix(code)));
+    for (column, judgement) in in_use.into_iter().chain(fixes) {
+        keep_good(table, layout, (column, judgement), notes)?;
     }
     Ok(())
+}
+
+/// How the fields of a column judge their rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Judgement {
+    InUse,
+    Fix(FixCode),
+}
+
+impl Judgement {
+    /// Whether a row counts; `None` where the field says nothing that is known.
+    fn of(self, text: &str) -> Option<bool> {
+        match self {
+            Self::InUse => flag(text),
+            Self::Fix(code) => has_fix(text, code),
+        }
+    }
+
+    fn is_vague(self) -> bool {
+        match self {
+            Self::InUse => true,
+            Self::Fix(code) => code.is_vague(),
+        }
+    }
+
+    /// What rows that do not count lack.
+    fn lack(self) -> &'static str {
+        match self {
+            Self::InUse => "are not in use",
+            Self::Fix(FixCode::Dimensions) => "have no three-dimensional fix",
+            Self::Fix(FixCode::Satellites) => "have no satellites",
+            Self::Fix(FixCode::Words | FixCode::Negated | FixCode::Rtklib) => "have no valid position",
+            Self::Fix(_) => "have no fix",
+        }
+    }
 }
 
 fn field_of<'a>(table: &Table<'a>, row: usize, column: usize) -> &'a str {
@@ -38,8 +77,7 @@ fn field_of<'a>(table: &Table<'a>, row: usize, column: usize) -> &'a str {
 }
 
 /// Keeps the rows whose receiver was in use, else those of the receiver of the lowest number.
-fn keep_one_receiver(table: &mut Table<'_>, layout: &TableLayout, notes: &mut Vec<Note>) {
-    let Some(receiver) = layout.receiver else { return };
+fn keep_one_receiver(table: &mut Table<'_>, layout: &TableLayout, receiver: usize, notes: &mut Vec<Note>) {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for row in 0..table.rows.len() {
         let name = field_of(table, row, receiver);
@@ -58,11 +96,7 @@ fn keep_one_receiver(table: &mut Table<'_>, layout: &TableLayout, notes: &mut Ve
             (0..table.rows.len()).filter_map(|row| flag(field_of(table, row, column))).collect();
         uses.contains(&true) && uses.contains(&false)
     });
-    let names: Vec<&String> = counts.keys().collect();
-    let first = names
-        .iter()
-        .min_by(|a, b| number(a).total_cmp(&number(b)))
-        .map_or(String::new(), |name| (**name).clone());
+    let first = lowest(&counts);
     let before = table.rows.len();
     let keeps: Vec<bool> = (0..before)
         .map(|row| {
@@ -82,21 +116,39 @@ fn keep_one_receiver(table: &mut Table<'_>, layout: &TableLayout, notes: &mut Ve
         }
         None => format!("those of `{first}` count"),
     };
+    notes.push(receivers_note(layout, receiver, &counts, &which, before - table.rows.len()));
+}
+
+/// The receiver of the lowest number, else the first by name.
+pub(super) fn lowest(counts: &BTreeMap<String, usize>) -> String {
+    let by_number = |a: &&String, b: &&String| number(a).total_cmp(&number(b));
+    counts.keys().min_by(by_number).cloned().unwrap_or_default()
+}
+
+pub(super) fn receivers_note(
+    layout: &TableLayout,
+    receiver: usize,
+    counts: &BTreeMap<String, usize>,
+    which: &str,
+    left_out: usize,
+) -> Note {
     let all: Vec<String> = counts.iter().map(|(name, rows)| format!("`{name}` ({rows} rows)")).collect();
-    push_warning(
-        notes,
-        format!(
-            "column {}{} has rows of {}: {which}, and {} rows are left out; keep the rows of one to choose another",
+    Note {
+        is_warning: true,
+        text: format!(
+            "column {}{} has rows of {}: {which}, and {left_out} rows are left out; keep the rows of one to choose \
+                another",
             receiver + 1,
             layout.bracketed_name(receiver),
             all.join(" and "),
-            before - table.rows.len()
         ),
-    );
+    }
 }
 
+/// A number, also in hexadecimal; infinity for any other text.
 fn number(text: &str) -> f64 {
-    text.parse().unwrap_or(f64::INFINITY)
+    let hexadecimal = text.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
+    hexadecimal.map_or_else(|| text.parse().unwrap_or(f64::INFINITY), f64::from)
 }
 
 /// A flag; `None` where the field is missing or is none.
@@ -113,96 +165,185 @@ fn has_fix(text: &str, code: FixCode) -> Option<bool> {
     if is_missing(text) && !text.eq_ignore_ascii_case("none") {
         return None;
     }
-    if let Ok(value) = text.parse::<f64>() {
+    let value = number(text);
+    if value.is_finite() {
         let is_code = value.fract() == 0.0 && value.abs() < 256.0;
-        return is_code.then_some(match code {
-            FixCode::Dimensions => value >= 3.0,
-            FixCode::NonZero => value != 0.0,
-            FixCode::NonNegative => value >= 0.0,
-        });
+        return match code {
+            _ if !is_code => None,
+            FixCode::Dimensions => Some(value >= 3.0),
+            FixCode::NonZero | FixCode::Satellites => Some(value != 0.0),
+            FixCode::NonNegative => Some(value >= 0.0),
+            FixCode::Rtklib => (0.0..10.0).contains(&value).then_some(value != 0.0),
+            FixCode::Negated => Some(value == 0.0),
+            FixCode::Words if value < 0.0 => Some(false),
+            FixCode::Words | FixCode::Unknown => None,
+        };
     }
     let word: String = text.to_ascii_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     let word = word.trim_start_matches("gpsfixtype").trim_start_matches("fixtype").trim_start_matches("gps");
-    const NONE: &[&str] =
-        &["none", "nofix", "no", "invalid", "false", "v", "nogps", "f", "lost", "notvalid", "unavailable"];
-    const SOME: &[&str] = &[
-        "true",
-        "a",
-        "t",
-        "yes",
-        "valid",
-        "ok",
-        "fix",
-        "fixed",
-        "rtk",
-        "rtkfixed",
-        "rtkfix",
-        "rtkfloat",
-        "float",
-        "dgps",
-        "single",
-        "sbas",
-        "ppp",
-        "spp",
-        "autonomous",
-    ];
+    match code {
+        FixCode::Unknown | FixCode::Rtklib | FixCode::Satellites => None,
+        FixCode::Negated => flag(text).map(|is_set| !is_set),
+        // NMEA's letter of a solution with real ambiguities.
+        FixCode::Words if word == "f" => None,
+        _ => word_has_fix(word),
+    }
+}
+
+/// Words for no position, in lower case, without marks.
+const NO_FIX: &[&str] = &[
+    "none",
+    "nofix",
+    "no",
+    "n",
+    "invalid",
+    "false",
+    "v",
+    "nogps",
+    "f",
+    "lost",
+    "notvalid",
+    "unavailable",
+    "void",
+    "bad",
+    "fail",
+    "failed",
+    "notracking",
+    "nottracking",
+    "nosolution",
+    "insufficientobs",
+    "noconvergence",
+    "searching",
+    "acquiring",
+];
+
+/// Words for a position.
+const FIX: &[&str] = &[
+    "true",
+    "a",
+    "d",
+    "r",
+    "t",
+    "y",
+    "yes",
+    "valid",
+    "ok",
+    "good",
+    "fix",
+    "fixed",
+    "float",
+    "dgps",
+    "single",
+    "sbas",
+    "waas",
+    "ppp",
+    "spp",
+    "autonomous",
+    "tracking",
+    "tracked",
+    "solcomputed",
+    "inssolutiongood",
+    "solutiongood",
+];
+
+/// Beginnings of such words: `3DDiff`, `RTK_INT`, and NovAtel's types of positions.
+const FIX_BEGINNINGS: &[&str] = &["3d", "rtk", "narrow", "wide", "l1", "psr", "inspsr", "insrtk"];
+
+fn word_has_fix(word: &str) -> Option<bool> {
     match word {
         // `2D Lock`, `3D RTK GPS Lock (float)`.
         word if word.starts_with("2d") => Some(false),
-        word if word.starts_with("3d") => Some(true),
-        word if NONE.contains(&word) => Some(false),
-        word if SOME.contains(&word) => Some(true),
+        word if FIX_BEGINNINGS.iter().any(|beginning| word.starts_with(beginning)) => Some(true),
+        word if NO_FIX.contains(&word) => Some(false),
+        word if FIX.contains(&word) => Some(true),
         _ => None,
     }
 }
 
-fn keep_fixes(
+/// Removes the rows that a column judges as not of the flight.
+fn keep_good(
     table: &mut Table<'_>,
     layout: &TableLayout,
-    (column, code): (usize, FixCode),
+    (column, judgement): (usize, Judgement),
     notes: &mut Vec<Note>,
 ) -> Result<(), String> {
     let name = format!("column {}{}", column + 1, layout.bracketed_name(column));
     let field = |row: usize| field_of(table, row, column);
     let rows = 0..table.rows.len();
     let is_flag = |row: usize| is_missing(field(row)) || matches!(number(field(row)), 0.0 | 1.0);
-    let code = if code == FixCode::Dimensions
+    let judgement = if judgement == Judgement::Fix(FixCode::Dimensions)
         && rows.clone().all(is_flag)
         && rows.clone().any(|row| number(field(row)) == 1.0)
     {
         push_warning(notes, format!("{name} holds only 0 and 1, so 1 is taken as a fix"));
-        FixCode::NonZero
+        Judgement::Fix(FixCode::NonZero)
     } else {
-        code
+        judgement
     };
-    let kind = if code == FixCode::Dimensions { "three-dimensional fix" } else { "fix" };
-    let fixes: Vec<Option<bool>> = rows.clone().map(|row| has_fix(field(row), code)).collect();
-    if let Some(row) = rows.clone().find(|&row| fixes[row].is_none() && !is_missing(field(row))) {
-        let (text, line) = (field(row), table.rows[row].number);
-        push_warning(
-            notes,
-            format!("{name} is not read: `{text}` (line {line}) is no known quality of a fix"),
-        );
+    let is_rate = || layout.names.iter().any(|name| ["p", "r"].contains(&&*name.to_ascii_lowercase()));
+    if judgement == Judgement::Fix(FixCode::Rtklib) && is_rate() {
         return Ok(());
     }
-    let left_out = fixes.iter().filter(|fix| **fix == Some(false)).count();
+    let judged: Vec<Option<bool>> = rows.clone().map(|row| judgement.of(field(row))).collect();
+    let unknown = rows.clone().find(|&row| judged[row].is_none() && !is_missing(field(row)));
+    match unknown {
+        Some(row) if !judgement.is_vague() => {
+            let (text, line) = (field(row), table.rows[row].number);
+            push_warning(
+                notes,
+                format!("{name} is not read: `{text}` (line {line}) is no known quality of a fix"),
+            );
+            return Ok(());
+        }
+        Some(_) if judgement != Judgement::Fix(FixCode::Words) => return Ok(()),
+        _ => {}
+    }
+    let left_out = judged.iter().filter(|counts| **counts == Some(false)).count();
     if left_out == 0 {
         return Ok(());
     }
-    if fixes.iter().filter(|fix| **fix == Some(true)).count() < MIN_ROWS {
-        return Err(format!(
-            "{name} says that {left_out} of {} rows have no {kind}, so there is no flight: remove the column if that \
-                is not so",
-            fixes.len()
-        ));
+    let (count, lack) = (judged.len(), judgement.lack());
+    // Below 0 is no position whatever the other numbers are.
+    let is_unknown_code =
+        |row: usize| unknown.is_some() && (0.0..f64::INFINITY).contains(&number(field(row)));
+    let kept = rows.filter(|&row| judged[row] == Some(true) || is_unknown_code(row));
+    if kept.count() < MIN_ROWS {
+        let problem = format!("{name} says that {left_out} of {count} rows {lack}");
+        if !judgement.is_vague() {
+            return Err(format!("{problem}, so there is no flight: remove the column if that is not so"));
+        }
+        let other = other_in_use(table, layout, column, judgement);
+        push_warning(notes, format!("{problem}: it is not applied, for no flight would be left{other}"));
+        return Ok(());
     }
-    let keeps: Vec<bool> = fixes.iter().map(|fix| *fix != Some(false)).collect();
+    let other = other_in_use(table, layout, column, judgement);
+    let keeps: Vec<bool> = judged.iter().map(|counts| *counts != Some(false)).collect();
     retain(table, &keeps);
-    push_warning(notes, format!("{left_out} rows have no {kind} by {name}, and are left out"));
+    push_warning(notes, format!("{left_out} rows {lack} by {name}, and are left out{other}"));
     Ok(())
 }
 
-fn retain(table: &mut Table<'_>, keeps: &[bool]) {
+/// Names another message of a merged table whose receiver was in use, as `GPS2.U` beside `GPS.U` says.
+fn other_in_use(table: &Table<'_>, layout: &TableLayout, column: usize, judgement: Judgement) -> String {
+    let parts = |column: usize| layout.names.get(column).and_then(|name| name.rsplit_once('.'));
+    let Some((message, field)) = parts(column).filter(|_| judgement == Judgement::InUse) else {
+        return String::new();
+    };
+    let is_used = |&other: &usize| {
+        other != column
+            && parts(other).is_some_and(|(_, other)| other == field)
+            && (0..table.rows.len()).any(|row| flag(field_of(table, row, other)) == Some(true))
+    };
+    (0..layout.names.len()).find(is_used).map_or(String::new(), |other| {
+        format!(
+            "; column {}{} says that its receiver was: remove the columns of `{message}` to fly it",
+            other + 1,
+            layout.bracketed_name(other)
+        )
+    })
+}
+
+pub(super) fn retain(table: &mut Table<'_>, keeps: &[bool]) {
     let mut keeps = keeps.iter();
     table.rows.retain(|_| keeps.next() != Some(&false));
 }

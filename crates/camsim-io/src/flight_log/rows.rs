@@ -301,7 +301,9 @@ impl<'a> RowFields<'a, '_> {
             [(sources[0], "latitude", latitude, 90.0), (sources[1], "longitude", longitude, 360.0)]
         {
             if value.is_finite() && value.abs() > limit {
-                let advice = if value.abs() > 1e5 && source.factor.is_none() && value.fract() == 0.0 {
+                let advice = if what == "latitude" && value.abs() <= 180.0 && longitude.abs() <= 90.0 {
+                    "are latitude and longitude swapped? Then swap the names of their columns"
+                } else if value.abs() > 1e5 && source.factor.is_none() && value.fract() == 0.0 {
                     "are these 1e-7 degrees? Then name the columns lat_e7 and lon_e7"
                 } else if are_degrees_and_minutes([latitude, longitude]) {
                     "are these degrees and minutes (ddmm.mmmm, as in NMEA: 4703.0 is 47 degrees and 3 minutes, \

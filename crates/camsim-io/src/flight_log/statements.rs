@@ -7,7 +7,7 @@
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{AngleUnit, FlightSpec, TimeUnit},
+    scenario::{AngleUnit, FlightSpec, Origin, TimeUnit},
 };
 
 use super::{
@@ -51,6 +51,7 @@ pub(super) fn apply(
     let lines: Vec<HeaderLine<'_>> = prose.iter().chain(&table.later_comments).copied().collect();
     let mut doubts = apply_units(layout, table, &lines, spec, notes);
     doubts.extend(conventions::apply(layout, &lines, spec, notes));
+    doubts.extend(lines.iter().filter_map(|line| reference_position(layout, line, spec)));
     if doubts.is_empty() {
         return;
     }
@@ -59,6 +60,26 @@ pub(super) fn apply(
     let quoted: Vec<String> = doubts.iter().take(MAX_QUOTED).map(Doubt::describe).collect();
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
     push_warning(notes, format!("not applied: {}{more}", quoted.join("; ")));
+}
+
+/// A comment of RTKLIB that says where local positions count from, unless flight.origin says the same.
+fn reference_position(layout: &TableLayout, line: &HeaderLine<'_>, spec: &FlightSpec) -> Option<Doubt> {
+    let (_, text) = line.text.trim().strip_prefix("ref pos")?.split_once(':')?;
+    let numbers: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
+    let [latitude, longitude, height_m] = numbers[..] else { return None };
+    if layout.frame == Frame::Geodetic || latitude.abs() > 90.0 || longitude.abs() > 360.0 {
+        return None;
+    }
+    let is_origin = |[lat, lon, _]: [f64; 3]| (lat - latitude).abs() < 1e-5 && (lon - longitude).abs() < 1e-5;
+    let reason = match spec.origin {
+        Origin::Geodetic(origin) if is_origin(origin) => return None,
+        Origin::Geodetic(_) => "flight.origin is another place".to_owned(),
+        Origin::First => format!(
+            "the positions are read as from no known place: set flight.origin = [{latitude}, {longitude}, \
+                {height_m:?}]"
+        ),
+    };
+    Some(Doubt::new(line, reason))
 }
 
 /// A statement that is not applied.

@@ -120,7 +120,7 @@ fn is_of_vehicle(name: &str) -> bool {
 }
 
 /// Whether positions of a frame are geocentric (REP 105: `earth`).
-pub(super) fn is_geocentric(name: &str) -> bool {
+pub(in super::super) fn is_geocentric(name: &str) -> bool {
     name == "earth" || words(name).iter().any(|word| word == "ecef")
 }
 
@@ -129,8 +129,13 @@ pub(super) fn is_grid(name: &str) -> bool {
     words(name).iter().any(|word| word == "utm" || word == "mgrs")
 }
 
+/// The axes of a world that a name states: `north-east-down`.
+pub(in super::super) fn world_axes(name: &str) -> Option<String> {
+    Axes::stated(name).map(|axes| axes.words(true))
+}
+
 /// Whether a name says how its axes point.
-pub(super) fn states_axes(name: &str) -> bool {
+pub(in super::super) fn states_axes(name: &str) -> bool {
     Axes::stated(name).is_some()
 }
 
@@ -159,7 +164,7 @@ fn single_frame(topic: &str, samples: &[Sample]) -> Result<Arc<str>, String> {
 ///
 /// # Errors
 /// The frames are several, or positions in them are no flight.
-pub(super) fn turn(
+pub(in super::super) fn turn(
     topic: &str,
     kind: RosKind,
     samples: &mut [Sample],

@@ -6,7 +6,7 @@ use super::cdr::Decoder;
 
 /// RosKind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum RosKind {
+pub(in super::super) enum RosKind {
     Pose,
     PoseWithCovariance,
     Odometry,
@@ -54,23 +54,23 @@ impl RosKind {
 
 /// What a message states.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Sample {
+pub(in super::super) struct Sample {
     /// Number of the message in the file, from 1.
-    pub(super) number: usize,
+    pub(in super::super) number: usize,
     /// Stamp of the header.
-    pub(super) stamp_ns: i128,
+    pub(in super::super) stamp_ns: i128,
     /// Time at which it was recorded.
-    pub(super) recorded_ns: i128,
+    pub(in super::super) recorded_ns: i128,
     /// x, y, z, or latitude, longitude, height.
-    pub(super) position: Option<[f64; 3]>,
+    pub(in super::super) position: Option<[f64; 3]>,
     /// x, y, z, w.
-    pub(super) rotation: Option<[f64; 4]>,
+    pub(in super::super) rotation: Option<[f64; 4]>,
     /// Whether a receiver had a fix; true of other messages.
-    pub(super) is_valid: bool,
+    pub(in super::super) is_valid: bool,
     /// Frame of the header, without the slash that ROS 1 had before it.
-    pub(super) frame: Arc<str>,
+    pub(in super::super) frame: Arc<str>,
     /// Frame whose pose it is, where the message names it.
-    pub(super) child: Option<Arc<str>>,
+    pub(in super::super) child: Option<Arc<str>>,
 }
 
 impl Sample {
