@@ -91,7 +91,10 @@ impl TableLayout {
         let path_named = Self::from_header(&first, table, &track, &mut Vec::new());
         let agrees = |layout: &Self| match &named {
             Ok(named) if named.attitude.kind() != AttitudeKind::None => named.has_columns_of(layout),
-            _ => path_named.as_ref().is_ok_and(|named| named.has_path_columns_of(layout)),
+            _ => {
+                names.len() > table.columns
+                    && path_named.as_ref().is_ok_and(|named| named.has_path_columns_of(layout))
+            }
         };
         match detected.map(|format| Self::without_header(table, format, spec)) {
             Ok(mut layout) if spec.format != LogFormat::Auto || agrees(&layout) => {
