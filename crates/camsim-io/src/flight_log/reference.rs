@@ -155,8 +155,7 @@ const RULES: &[(&str, &str)] = &[
     (
         "Coarse clocks",
         "rows that share the stamps of a clock (ten rows for each whole second) are spread evenly over its \
-            steps, with a warning; a clock that stands still while the platform moves is refused. Rows before \
-            1990 among rows of this century, of a clock that is not set yet, are left out and counted",
+            steps, with a warning; a clock that stands still while the platform moves is refused",
     ),
     (
         "Held positions",
