@@ -156,7 +156,7 @@ impl FramePlan {
         writeln!(f, "  travel {travel_m:.4} m, rotation {:.4} deg", rotation_rad.to_degrees())?;
         writeln!(
             f,
-            "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)"
+            "  moves a pixel of the ideal frame by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)"
         )
     }
 }
@@ -188,12 +188,12 @@ impl fmt::Display for FramePlan {
         )?;
         writeln!(
             f,
-            "  moves a pixel by at most {:.3} px (rotation) + {:.3} px (parallax)",
+            "  moves a pixel of the ideal frame by at most {:.3} px (rotation) + {:.3} px (parallax)",
             own.rotation_px, own.parallax_px
         )?;
         writeln!(
             f,
-            "  longest blur path {blur_px:.3} px; a straight line differs from it by at most {blur_sagitta_px:.2e} px"
+            "  longest blur path {blur_px:.3} px of it; a straight line differs from it by at most {blur_sagitta_px:.2e} px"
         )?;
         self.write_departure(f)?;
         write_prediction(&self.predicted, f)?;
