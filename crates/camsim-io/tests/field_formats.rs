@@ -411,6 +411,7 @@ fn rows_of_bad_states_are_left_out() {
     for (name, value, words) in [
         ("used", "0", "61 of 61 rows are not in use: it is not applied"),
         ("num_sats", "0", "61 of 61 rows have no satellites: it is not applied"),
+        ("num_sats", "3", "61 rows have fewer than four satellites by column 5"),
         ("mode", "AUTO", ""),
         ("status", "3", ""),
         ("Q", "0.013", ""),

@@ -298,6 +298,9 @@ fn keep_good(
         Some(_) if judgement != Judgement::Fix(FixCode::Words) => return Ok(()),
         _ => {}
     }
+    if judgement == Judgement::Fix(FixCode::Satellites) {
+        warn_of_few_satellites(&name, rows.clone().map(field), notes);
+    }
     let left_out = judged.iter().filter(|counts| **counts == Some(false)).count();
     if left_out == 0 {
         return Ok(());
@@ -321,6 +324,20 @@ fn keep_good(
     retain(table, &keeps);
     push_warning(notes, format!("{left_out} rows {lack} by {name}, and are left out{other}"));
     Ok(())
+}
+
+/// A position in three dimensions and the receiver's clock are four unknowns.
+fn warn_of_few_satellites<'a>(name: &str, fields: impl Iterator<Item = &'a str>, notes: &mut Vec<Note>) {
+    let few = fields.filter(|field| (1.0..4.0).contains(&number(field))).count();
+    if few > 0 {
+        push_warning(
+            notes,
+            format!(
+                "{few} rows have fewer than four satellites by {name}, which give no height: they are flown as they \
+                    stand; remove them if their positions jump"
+            ),
+        );
+    }
 }
 
 /// Names another message of a merged table whose receiver was in use, as `GPS2.U` beside `GPS.U` says.

@@ -67,7 +67,12 @@ pub(super) static HOUR: Unit = unit("h", Dimension::Time, 3600e9, &["h", "hr", "
 static DAY: Unit = unit("days", Dimension::Time, 86_400e9, &["day", "days"]);
 pub(super) static METRE: Unit =
     unit("m", Dimension::Length, 1.0, &["m", "meter", "meters", "metre", "metres", "mtr", "mtrs"]);
-static FOOT: Unit = unit("ft", Dimension::Length, 0.3048, &["ft", "foot", "feet"]);
+static FOOT: Unit = unit(
+    "ft",
+    Dimension::Length,
+    0.3048,
+    &["ft", "foot", "feet", "fuß", "fuss", "pied", "pieds", "pies", "piedi", "voet"],
+);
 static SURVEY_FOOT: Unit = unit(
     "US survey foot",
     Dimension::Length,

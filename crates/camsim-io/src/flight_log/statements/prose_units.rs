@@ -130,6 +130,18 @@ const FILLERS: &[&str] = &[
     "magnetic",
     "per",
     "/",
+    "en",
+    "über",
+    "meer",
+    "meeresspiegel",
+    "nn",
+    "au",
+    "dessus",
+    "du",
+    "niveau",
+    "de",
+    "la",
+    "mer",
 ];
 /// Such words that make another quantity of one right behind them, as in `frame height` and `start time`.
 const MODIFIERS: &[&str] = &[
@@ -170,7 +182,7 @@ const FILLER_PAIRS: &[[&str; 2]] = &[
 const WHOLE_TABLE: &[&str] = &["unit", "units", "values", "pose", "poses"];
 /// Words behind which a unit stands.
 const LINKS: &[&str] =
-    &["in", "is", "are", "unit", "units", "as", "decimal", "and", "use", "uses", "using", "given"];
+    &["in", "en", "is", "are", "unit", "units", "as", "decimal", "and", "use", "uses", "using", "given"];
 /// Quantities that are not read, and words that make another quantity of the one beside them (`antenna
 /// height`, `time offset`); their units do not matter.
 const OTHERS: &[&str] = &[
@@ -327,7 +339,10 @@ fn quantity(word: &str, frame: Frame) -> Option<Quantity> {
         "lat" | "latitude" | "latitudes" => degrees(0),
         "lon" | "lng" | "long" | "longitude" | "longitudes" => degrees(1),
         "alt" | "alts" | "altitude" | "altitudes" | "height" | "heights" | "elevation" | "elevations"
-        | "ele" | "elev" | "hmsl" | "hae" | "down" | "z" | "tz" => position(2),
+        | "ele" | "elev" | "hmsl" | "hae" | "down" | "z" | "tz"
+        // German, French, Spanish, Italian.
+        | "höhe" | "höhen" | "hoehe" | "hauteur" | "hauteurs" | "altitud" | "altura" | "altitudine"
+        | "quota" => position(2),
         "north" | "northing" => horizontal(north),
         "east" | "easting" => horizontal(east),
         "x" | "tx" => horizontal(0),
@@ -563,6 +578,9 @@ mod tests {
             ("heights in feet above mean sea level", vec![(height(), "ft")]),
             ("Altitude: ft", vec![(height(), "ft")]),
             ("altitude (feet), speed (knots)", vec![(height(), "ft")]),
+            ("altitude en pieds", vec![(height(), "ft")]),
+            ("Höhe in Fuß über NN", vec![(height(), "ft")]),
+            ("Höhen in Fuss", vec![(height(), "ft")]),
             ("speed in knots, altitude in feet", vec![(height(), "ft")]),
             ("roll, pitch and yaw are in radians", vec![(angles(), "rad")]),
             ("attitude angles in radians; time in ms", vec![(angles(), "rad"), (vec![Time], "ms")]),
