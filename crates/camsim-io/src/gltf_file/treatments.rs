@@ -253,8 +253,8 @@ mod tests {
             "# Support of glTF extensions and properties\n\nMade from \
              `crates/camsim-io/src/gltf_file/treatments.rs`; [MODELS.md](../../guide/MODELS.md) describes \
              how models are shown.\n\n*Applied*: it has its effect. *Refused*: the file is not read; the \
-             error names it and a remedy. *Reported*: it is ignored with a warning. *Irrelevant*: it changes nothing in the \
-             picture.\n\n## Extensions\n\nA file that requires an extension is refused unless it is applied \
+             error names it and a remedy. *Reported*: it is ignored with a warning. *Irrelevant*: it changes nothing \
+             in the picture.\n\n## Extensions\n\nA file that requires an extension is refused unless it is applied \
              or irrelevant. An extension that is listed as refused is accepted where the file has a \
              fallback: uncompressed buffers, PNG or JPEG images. `*` matches any ending. Extensions that are \
              not listed are reported.\n\n{}\n## Properties\n\n{}",

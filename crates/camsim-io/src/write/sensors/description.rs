@@ -128,8 +128,8 @@ impl<'a> Description<'a> {
         let text = toml::to_string(&self.file(counts)).map_err(encode)?;
         let head = format!(
             "{MARK}the columns of {}.csv are defined in docs/guide/SENSORS.md. The body's axes are forward, \
-             right, down;\n# T_body_sensor takes points of the sensor's axes to them. [scenario] has the keys \
-             of the scenario.\n",
+             right, down;\n# T_body_sensor takes points of the sensor's axes to them. [scenario] has the \
+             keys of the scenario.\n",
             self.name
         );
         write_atomic(&path, (head + &text).as_bytes())
