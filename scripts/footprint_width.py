@@ -1,4 +1,4 @@
-"""Best side of the square that stands for a pixel footprint (crates/camsim-core/src/temporal/footprint.rs, docs/DECISIONS.md).
+"""Best side of the square that stands for a pixel footprint (crates/camsim-core/src/temporal/footprint.rs, docs/theory/DECISIONS.md).
 
 Straight borders are drawn at random into ideal frames whose pixels have one sample or four, and a pixel `w` ideal pixels wide is read by grids of bilinear reads and by means over squares
 with the sides sqrt(w^2 - c). Printed is the RMS of what they are off the part of the pixel that the border truly covers, for as many pixel sides of border as pixels.

@@ -6,7 +6,7 @@
 ...     print(frame.index, frame.stamp_ns, frame.color.shape, float(frame.depth.max()))
 
 World: local north-east-down, metres. Camera: right, down, forwards, as OpenCV; pixel (0, 0) is the centre of the
-top-left pixel. Quaternions are scalar first. `docs/PYTHON.md` is the page of this package.
+top-left pixel. Quaternions are scalar first. `docs/guide/PYTHON.md` is the page of this package.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class Frame(Mapping[str, NDArray[Any]]):
 
     Each array is the memory that the renderer has filled, without a copy, and keeps it as long as the array is used:
     numpy calls that a view of its `base` (`flags.owndata` is False). ``__dlpack__`` hands it on to other libraries. Images are height x width (x components), row by row from
-    the top-left pixel; `docs/CHANNELS.md` says what each channel holds.
+    the top-left pixel; `docs/reference/CHANNELS.md` says what each channel holds.
 
     >>> frame = scenario[7]
     >>> frame.depth.shape, frame.depth.dtype

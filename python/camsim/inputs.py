@@ -112,7 +112,7 @@ class HeightMap:
     step: tuple[float, float]
     """Distance of columns (x), then of rows (y), in the same unit, both above 0."""
     epsg: int = 4326
-    """The coordinate system: 4326 is longitude and latitude; else one of `docs/inputs/TERRAIN.md`."""
+    """The coordinate system: 4326 is longitude and latitude; else one of `docs/reference/inputs/TERRAIN.md`."""
 
     def __post_init__(self) -> None:
         heights = numbers_of(self.heights_m, "HeightMap: heights_m")

@@ -18,7 +18,7 @@ Numbers = float | Sequence[float]
 
 
 class Distribution:
-    """How a value is drawn; `docs/RANDOMIZE.md` describes all of them."""
+    """How a value is drawn; `docs/guide/RANDOMIZE.md` describes all of them."""
 
     def to_dict(self) -> dict[str, Any]:
         """The distribution as a scenario file has it."""

@@ -273,7 +273,7 @@ class Scenario(Sequence[Frame]):
         """Renders one frame. Several in order are faster by `frames`.
 
         :param index: Number of the frame; negative from the end.
-        :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
+        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
         :raises IndexError: There is no such frame.
         """
         number = self._number(index)
@@ -293,7 +293,7 @@ class Scenario(Sequence[Frame]):
         """Renders frames in order; while Python works on one, the next ones are under way.
 
         :param start, stop, step: As those of a slice of this scenario.
-        :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
+        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
         :param twins: Render the twins of each frame too, with the channels of `[[output.twin]]` or those of the frame;
             `Frame.twin` gives them.
         :param progress: Show a bar by tqdm, if that is installed.

@@ -49,7 +49,7 @@ class Dataset(torch.utils.data.Dataset[Any]):  # type: ignore[misc, unused-ignor
     ) -> None:
         """
         :param source: A scenario, or variations with a count.
-        :param channels: Names as in `docs/CHANNELS.md`; those of `output.channels` if left out.
+        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
         :param frames: Numbers of the frames; all of a scenario, and the first of each variation, if left out.
         :param transform: Called with each sample.
         """

@@ -10,7 +10,7 @@ script, collected from public repositories: its last column says where from.
 
 Made with cv2 4.14.0 (cv2.omnidir is only in opencv-contrib 4), pycolmap 4.2.1 and numpy 2.4; others should give the same digits to 1e-9 px.
 Double sphere, UCM, f-theta and Kannala-Brandt beyond 90 degrees have no program here: their formulas are written out in Cartesian
-coordinates, after arXiv 1807.08957 and the definitions in docs/LENSES.md.
+coordinates, after arXiv 1807.08957 and the definitions in docs/reference/LENSES.md.
 """
 
 import csv

@@ -69,7 +69,7 @@ struct Frame {
     key_rows: u32,
     pad1: f32,
     // Radius within which a surface replaces the sky at the last depth look-up, pixels of the ideal frame
-    // (docs/ACCURACY.md, "Skylines").
+    // (docs/theory/ACCURACY.md, "Skylines").
     sky_reach_px: f32,
     // Plane per ideal frame, at which the depth iteration starts: its inverse planar depth is the dot product
     // with (u, v, 1), 1/m.
@@ -79,5 +79,5 @@ struct Frame {
 @group(0) @binding(0) var<uniform> frame_uniforms: Frame;
 
 // Copy of the uniforms, made at the start of each kernel: llvmpipe reads each member of a uniform buffer lane
-// by lane inside a loop or condition (docs/DECISIONS.md, "Gpu renderer").
+// by lane inside a loop or condition (docs/theory/DECISIONS.md, "Gpu renderer").
 var<private> frame: Frame;

@@ -3,7 +3,7 @@
 //!
 //! The controller never sees rendered pictures. It runs over the sequence from frame 0 with a meter of its own
 //! (`meter`), so that a frame's exposure is a function of the scenario and the frame number, whatever is
-//! rendered, in whichever order and by whom. Formulas: docs/IMAGING.md.
+//! rendered, in whichever order and by whom. Formulas: docs/theory/IMAGING.md.
 
 mod controller;
 mod meter;

@@ -3,7 +3,7 @@
 //!
 //! There is one implementation for all renderers: it takes the finished picture of any of them. A sensor's
 //! numbers are a function of (light, seed, camera, frame, pixel), the same on every machine. Formulas:
-//! docs/IMAGING.md.
+//! docs/theory/IMAGING.md.
 
 mod demosaic;
 mod develop;

@@ -1,5 +1,5 @@
 //! Sensors beside the camera: inertial units, satellite receivers, barometers, magnetometers, all from the
-//! closed-form trajectory (docs/SENSORS.md).
+//! closed-form trajectory (docs/guide/SENSORS.md).
 //!
 //! Sample k of a sensor is taken at path time `k / rate_hz`, k any whole number, so that k = 0 is at the first
 //! good row of the log. Its noise is a function of (seed, name of the sensor, k). Errors with a memory

@@ -22,7 +22,8 @@ impl AdapterSummary {
 }
 
 /// Pixels per thread of the reverse kernel on a software adapter: reading a line's poses costs llvmpipe up to
-/// two fifths of the kernel, and there are few processors to keep busy (docs/DECISIONS.md, "Gpu renderer").
+/// two fifths of the kernel, and there are few processors to keep busy (docs/theory/DECISIONS.md,
+/// "Gpu renderer").
 const SOFTWARE_PIXELS_PER_THREAD: u32 = 16;
 
 /// An open adapter: device and queue.

@@ -20,8 +20,8 @@
 //! Their positions and attitudes may be in streams of their own (`streams`). Further formats are refused with
 //! the tool that converts them (`foreign_formats`). Ambiguities are refused, or resolved with a note in the
 //! log: units that no header names (`time_unit`, `angle_unit`), clocks that roll over (`clock_rollover`),
-//! tables merged from several streams (`sparse_rows`). docs/inputs/LOGS.md lists all names and units; it is
-//! generated from the tables in these modules.
+//! tables merged from several streams (`sparse_rows`). docs/reference/inputs/LOGS.md lists all names and
+//! units; it is generated from the tables in these modules.
 //!
 //! **TUM and EuRoC** worlds have z up: x is taken as east, y as north. Their quaternions (Hamilton, world
 //! from body) belong to a body with x forward, y left, z up (FLU, as in ROS), and are converted to FRD. For

@@ -1,10 +1,10 @@
-//! Test helper: compares pages of `docs/inputs` with those generated from the readers' tables.
+//! Test helper: compares pages of `docs/reference/inputs` with those generated from the readers' tables.
 
 use std::path::Path;
 
 /// Compares a generated page with its file, or writes the file if `CAMSIM_BLESS` is 1.
 pub(crate) fn check(name: &str, page: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/inputs").join(name);
     if std::env::var_os("CAMSIM_BLESS").is_some_and(|bless| bless == "1") {
         let written =
             path.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(&path, page));

@@ -156,8 +156,9 @@ pub enum TerrainFileError {
     },
     /// The coordinate system is not supported.
     #[error(
-        "{path}: EPSG:{epsg} is not supported (docs/inputs/TERRAIN.md has those that are): reproject with \
-         `gdalwarp -t_srs EPSG:CODE IN OUT`, or set scene.terrain.epsg if the file states a wrong code"
+        "{path}: EPSG:{epsg} is not supported (docs/reference/inputs/TERRAIN.md has those that are): \
+         reproject with `gdalwarp -t_srs EPSG:CODE IN OUT`, or set scene.terrain.epsg if the file states a \
+         wrong code"
     )]
     UnsupportedCrs {
         /// The file.

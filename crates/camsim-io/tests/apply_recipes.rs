@@ -1,4 +1,4 @@
-//! Reads every recipe of docs/APPLY.md, with small pictures in place of those that it names.
+//! Reads every recipe of docs/guide/APPLY.md, with small pictures in place of those that it names.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -6,9 +6,9 @@ use std::{fs, path::Path};
 use camsim_io::frame_file::read_frame_set;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, SmallVec, Vec2, WritableImage};
 
-/// The `toml` blocks of docs/APPLY.md.
+/// The `toml` blocks of docs/guide/APPLY.md.
 fn recipes() -> Vec<String> {
-    let page = include_str!("../../../docs/APPLY.md");
+    let page = include_str!("../../../docs/guide/APPLY.md");
     page.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap().to_owned()).collect()
 }
 

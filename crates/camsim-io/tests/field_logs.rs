@@ -385,7 +385,7 @@ fn unitless_radians_are_inferred_unless_the_key_says_degrees() {
     assert!((log.rows[0].ned_from_body.to_euler(EulerRot::ZYX).0.to_degrees() - 2.8).abs() < 1e-9);
 }
 
-/// Reads every real flight, and compares the results with the table in docs/inputs.
+/// Reads every real flight, and compares the results with the table in docs/reference/inputs.
 #[test]
 fn published_flights_are_read_or_refused_as_expected() {
     let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
@@ -475,7 +475,7 @@ fn published_flights_are_read_or_refused_as_expected() {
             (Err(error), _) => faults.push(error.clone()),
         }
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/FLIGHTS-MEASURED.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/inputs/FLIGHTS-MEASURED.md");
     if std::env::var_os("CAMSIM_BLESS").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, &table).unwrap();

@@ -315,7 +315,7 @@ fn ortho_image_that_contains_the_dem_gets_no_margin() {
 
 #[test]
 fn documentation_page_matches_the_tables() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/TERRAIN.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/inputs/TERRAIN.md");
     let page = camsim_io::terrain::documentation();
     if std::env::var_os("CAMSIM_BLESS").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -324,7 +324,7 @@ fn documentation_page_matches_the_tables() {
     assert_eq!(
         std::fs::read_to_string(&path).unwrap_or_default(),
         page,
-        "CAMSIM_BLESS=1 writes docs/inputs/TERRAIN.md"
+        "CAMSIM_BLESS=1 writes docs/reference/inputs/TERRAIN.md"
     );
 }
 

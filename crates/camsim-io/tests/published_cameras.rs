@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use camsim_core::scenario::{CameraSpec, LensModel};
 use camsim_io::camera_file::{CameraFileError, camera_names, import_camera_named};
 
-const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/inputs/CAMERAS-MEASURED.md");
+const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/inputs/CAMERAS-MEASURED.md");
 
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("CAMSIM_DATA").map(PathBuf::from);
@@ -118,8 +118,8 @@ fn published_files_give_the_documented_results() {
     let written = std::fs::read_to_string(TABLE).unwrap_or_default();
     assert!(
         written == table,
-        "docs/inputs/CAMERAS-MEASURED.md differs from the result: run with CAMSIM_BLESS=1 and review the \
-         difference"
+        "docs/reference/inputs/CAMERAS-MEASURED.md differs from the result: run with CAMSIM_BLESS=1 and \
+         review the difference"
     );
 }
 

@@ -1,5 +1,5 @@
 // Poses of a line, read once for all pixels that a thread processes along it: llvmpipe reads a buffer lane by
-// lane, and reading them per pixel took up to two fifths of the kernel's time (docs/DECISIONS.md, "Gpu
+// lane, and reading them per pixel took up to two fifths of the kernel's time (docs/theory/DECISIONS.md, "Gpu
 // renderer").
 const CACHED_STEPS: u32 = SEGMENT_STEPS * SEGMENTS;
 

@@ -24,7 +24,7 @@ use crate::{
 /// and twins that the layout needs, into DIR/camsim. Pictures are linked or copied where the layout's readers take
 /// them as they are, and else written as grey or RGB without alpha. Pixel origins, axes, quaternion orders, clocks and units are turned to what the layout's readers expect; DIR/README.md
 /// says how. The same command again completes an export that was stopped. `output.datasets = ["euroc"]` in a
-/// scenario does this at the end of `camsim render`. docs/DATASETS.md describes the layouts.
+/// scenario does this at the end of `camsim render`. docs/reference/DATASETS.md describes the layouts.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -20,7 +20,7 @@ const WIDTHS_PX: std::ops::RangeInclusive<u32> = 96..=4096;
 /// Reproduce the experiments of section 8 of the paper
 ///
 /// Each experiment prints its tables and writes its own folder with tables (CSV), plots (SVG), images (PNG)
-/// and a report.md. Results beside those of the paper: docs/REPRODUCTION.md.
+/// and a report.md. Results beside those of the paper: docs/theory/REPRODUCTION.md.
 ///
 /// The paper's flight log, camera poses and target are not part of camsim. Name their folder with --data (or
 /// the environment variable CAMSIM_DATA). Without it, tracking, lens and map run on built-in substitutes,

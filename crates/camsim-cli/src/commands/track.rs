@@ -137,7 +137,7 @@ fn write_sensor_tables(
     if sensors.is_empty() {
         return Err(Failure::bad_input(anyhow!(
             "--sensors: the scenario has none; add [[imu]], [[gnss]], [[barometer]] or [[magnetometer]] \
-             (docs/SENSORS.md)"
+             (docs/guide/SENSORS.md)"
         )));
     }
     for warning in sensor_warnings(scenario, log, &tracked.trajectory) {

@@ -114,7 +114,7 @@ fn the_meter_finds_the_mean_of_the_picture() {
         let sequence = sequence_of(scenario, vignette);
         for frame in [0, 75, 95, 150] {
             let (metered, rendered) = (track(&sequence).level(frame), mean(&render(&sequence, frame)));
-            // docs/IMAGING.md has this figure.
+            // docs/theory/IMAGING.md has this figure.
             assert!((metered / rendered - 1.0).abs() < 0.02, "{frame}: {metered} {rendered}");
         }
     }

@@ -1,5 +1,5 @@
 //! The lens as a blur: point spread and veiling glare, on the linear light of a finished exposure
-//! (`[camera.point_spread]`; docs/IMAGING.md).
+//! (`[camera.point_spread]`; docs/theory/IMAGING.md).
 //!
 //! There is one implementation for all renderers. It follows the vignette, which dims the light of a point
 //! before it is spread, and precedes the image sensor or the simple model's light and noise.

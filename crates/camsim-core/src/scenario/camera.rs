@@ -211,7 +211,7 @@ pub enum Axis {
     Z,
 }
 
-/// `[camera.lens]`: model and coefficients. `docs/LENSES.md` lists the models.
+/// `[camera.lens]`: model and coefficients. `docs/reference/LENSES.md` lists the models.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LensSpec {

@@ -165,7 +165,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
         }
         other => {
             let advice = "PINHOLE, PINHOLE_FULL, KANNALA_BRANDT and MEI can be imported; a lens of another model is \
-                          a table of points (docs/LENSES.md)";
+                          a table of points (docs/reference/LENSES.md)";
             return Err(KeyProblem::new("model_type", lens_models::unsupported_model(other, advice)));
         }
     };

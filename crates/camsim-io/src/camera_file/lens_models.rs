@@ -47,7 +47,8 @@ pub(super) fn lens_by_name(
                 unsupported_model(
                     model,
                     "radial-tangential (radtan, plumb_bob, rational_polynomial), equidistant, omni, ds, eucm, ucm, \
-                     fov and none can be imported; a lens of another model is a table of points (docs/LENSES.md)",
+                     fov and none can be imported; a lens of another model is a table of points \
+                     (docs/reference/LENSES.md)",
                 ),
             )),
         },

@@ -107,7 +107,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
             "camera.type",
             format!(
                 "is `{kind}` ({full_name}), which is not supported: calibrate as pinhole, with equidistant \
-                 distortion if it is a fisheye, or make a table of points of it (docs/LENSES.md)"
+                 distortion if it is a fisheye, or make a table of points of it (docs/reference/LENSES.md)"
             ),
         ));
     }

@@ -205,7 +205,7 @@ fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, receivers: &[String], note
         )
         .line("`imuN/data.csv`", "angular rates, then accelerations");
     for receiver in receivers {
-        page.line(&format!("`{receiver}`"), "columns as in docs/SENSORS.md, measured values alone");
+        page.line(&format!("`{receiver}`"), "columns as in docs/guide/SENSORS.md, measured values alone");
     }
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("time of cam{i}"), &timing(camera));

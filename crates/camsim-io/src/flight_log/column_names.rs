@@ -1,4 +1,4 @@
-//! Known names of columns and their meanings. docs/inputs/LOGS.md is generated from this table.
+//! Known names of columns and their meanings. docs/reference/inputs/LOGS.md is generated from this table.
 
 use super::{
     column_meaning::{ColumnMeaning, FixCode},

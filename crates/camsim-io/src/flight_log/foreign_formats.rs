@@ -12,7 +12,7 @@ pub(super) struct ForeignFormat {
     pub(super) advice: &'static str,
 }
 
-/// Formats recognised by their signature. docs/inputs/LOGS.md lists them.
+/// Formats recognised by their signature. docs/reference/inputs/LOGS.md lists them.
 pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
     ForeignFormat {
         name: "an ArduPilot log as text",
@@ -98,7 +98,7 @@ pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
     },
 ];
 
-/// Subtitles, recognised by their second line: name and advice. docs/inputs/LOGS.md lists them.
+/// Subtitles, recognised by their second line: name and advice. docs/reference/inputs/LOGS.md lists them.
 pub(super) const SUBTITLES: (&str, &str) = (
     "subtitles of a video (DJI's .SRT)",
     "write a CSV with a header `t_s,lat_deg,lon_deg,alt_msl_m` (exiftool -ee -csv of the video, or its \
@@ -126,7 +126,7 @@ pub(super) const BINARY: (&str, &str) = (
     "binary, of no known kind",
     "give the log as text (CSV with a header line, TUM, EuRoC), GPX, KML, IGC, ULog, ArduPilot's .bin or MCAP",
 );
-/// Formats that no signature at the first byte tells. docs/inputs/LOGS.md lists them.
+/// Formats that no signature at the first byte tells. docs/reference/inputs/LOGS.md lists them.
 pub(super) static OTHER_BINARY: [(&str, &str); 4] = [MAVLINK, VIDEO, FIT, BINARY];
 
 /// Name and advice of XML files with any other root element.

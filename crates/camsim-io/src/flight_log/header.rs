@@ -167,8 +167,8 @@ pub(super) fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedNa
             Some(parsed) => qualifiers.extend(parsed),
             None => {
                 problem = Some(format!(
-                    "`{text}` is no unit known; docs/inputs/LOGS.md lists them, and a column that needs none \
-                        should name none"
+                    "`{text}` is no unit known; docs/reference/inputs/LOGS.md lists them, and a column that \
+                        needs none should name none"
                 ))
             }
         }

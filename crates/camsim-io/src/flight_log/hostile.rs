@@ -112,7 +112,7 @@ fn auto() -> FlightSpec {
 
 #[test]
 fn logs_md_is_up_to_date() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/LOGS.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/inputs/LOGS.md");
     if std::env::var_os("CAMSIM_BLESS").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, reference()).unwrap();

@@ -203,7 +203,7 @@ fn apply_one_message(columns: &mut [HeaderColumn]) {
     }
 }
 
-/// Rows of docs/inputs/LOGS.md: messages and the fields that are read, with their units.
+/// Rows of docs/reference/inputs/LOGS.md: messages and the fields that are read, with their units.
 pub(super) fn documentation() -> Vec<(String, String)> {
     let field = |(name, _, unit): &Field| match unit {
         Some(unit) => format!("{name} ({})", unit.name),

@@ -20,7 +20,7 @@ const RINEX: (&str, &str) = (
     "compute positions with RTKLIB (rnx2rtkp), and give its .pos file",
 );
 
-/// Names and advice. docs/inputs/LOGS.md lists them.
+/// Names and advice. docs/reference/inputs/LOGS.md lists them.
 pub(super) static RECEIVER_LOGS: [(&str, &str); 4] = [NOVATEL, VECTORNAV, SENTENCES, RINEX];
 
 /// Name and advice of such a log; `None` of any other file.

@@ -1,4 +1,4 @@
-//! Generates docs/inputs/LOGS.md from the reader's tables.
+//! Generates docs/reference/inputs/LOGS.md from the reader's tables.
 
 use std::fmt::Write;
 

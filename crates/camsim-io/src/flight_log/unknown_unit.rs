@@ -14,7 +14,8 @@ pub(super) fn unknown_units(header: &HeaderColumns) -> Vec<(ColumnMeaning, Strin
         .filter_map(|column| {
             let (meaning, word) = unknown_unit(header.name(column))?;
             let text = format!(
-                "column {} (`{}`) is not read: `{word}` is no unit known (docs/inputs/LOGS.md lists them)",
+                "column {} (`{}`) is not read: `{word}` is no unit known \
+                 (docs/reference/inputs/LOGS.md lists them)",
                 column + 1,
                 header.name(column)
             );

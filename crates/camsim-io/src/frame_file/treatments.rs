@@ -1,4 +1,5 @@
-//! Tables of `docs/inputs/APPLY.md`: the keys of FRAME.toml, and the treatment of metadata in its files.
+//! Tables of `docs/reference/inputs/APPLY.md`: the keys of FRAME.toml, and the treatment of metadata in its
+//! files.
 
 /// A key, and the values that it takes.
 type KeyTreatment = (&'static str, &'static str);
@@ -146,8 +147,8 @@ mod tests {
             FILES.iter().map(|(what, how, note)| format!("| {what} | {how} | {note} |\n")).collect();
         format!(
             "# What `camsim apply` takes, and what becomes of it\n\n\
-             Made from `crates/camsim-io/src/frame_file/treatments.rs`; [APPLY.md](../APPLY.md) tells how it \
-             is used.\n\n\
+             Made from `crates/camsim-io/src/frame_file/treatments.rs`; [APPLY.md](../../guide/APPLY.md) \
+             tells how it is used.\n\n\
              ## Keys of FRAME.toml\n\nAll are applied; a key that is not here is refused, with the nearest \
              that is.\n\n| key | what it takes |\n|---|---|\n{keys}\n\
              ## What files say of themselves\n\n*Applied*: it does what it says. *Refused*: an error that \

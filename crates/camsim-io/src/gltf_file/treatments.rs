@@ -235,7 +235,7 @@ fn joined(names: &[&str]) -> String {
 mod tests {
     use super::*;
 
-    /// Contents of `docs/inputs/MODELS.md`.
+    /// Contents of `docs/reference/inputs/MODELS.md`.
     fn page() -> String {
         let text = |treatment: &Treatment| match treatment {
             Applied => "applied",
@@ -251,10 +251,10 @@ mod tests {
         };
         format!(
             "# Support of glTF extensions and properties\n\nMade from \
-             `crates/camsim-io/src/gltf_file/treatments.rs`; [MODELS.md](../MODELS.md) describes how models \
-             are shown.\n\n*Applied*: it has its effect. *Refused*: the file is not read; the error names it \
-             and a remedy. *Reported*: it is ignored with a warning. *Irrelevant*: it changes nothing in the \
-             picture.\n\n## Extensions\n\nA file that requires an extension is refused unless it is applied \
+             `crates/camsim-io/src/gltf_file/treatments.rs`; [MODELS.md](../../guide/MODELS.md) describes \
+             how models are shown.\n\n*Applied*: it has its effect. *Refused*: the file is not read; the \
+             error names it and a remedy. *Reported*: it is ignored with a warning. *Irrelevant*: it changes nothing \
+             in the picture.\n\n## Extensions\n\nA file that requires an extension is refused unless it is applied \
              or irrelevant. An extension that is listed as refused is accepted where the file has a \
              fallback: uncompressed buffers, PNG or JPEG images. `*` matches any ending. Extensions that are \
              not listed are reported.\n\n{}\n## Properties\n\n{}",

@@ -1,4 +1,4 @@
-//! `docs/inputs/TERRAIN.md`, made from the readers' tables.
+//! `docs/reference/inputs/TERRAIN.md`, made from the readers' tables.
 
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -97,7 +97,7 @@ const KEYS: &[(&str, &str)] = &[
     ),
 ];
 
-/// Contents of `docs/inputs/TERRAIN.md`.
+/// Contents of `docs/reference/inputs/TERRAIN.md`.
 #[must_use]
 pub fn documentation() -> String {
     let mut page = String::from(

@@ -249,7 +249,7 @@ fn horizontal_systems_are_supported_or_refused() {
         (&[1024, 1, 1025, 1, 2048, 4326], "has a user-defined coordinate system"),
         (&[1024, 2, 1025, 1, 2048, 32767], "has a user-defined coordinate system"),
         (&[1024, 3, 1025, 1], "geocentric"),
-        (&[1024, 1, 1025, 1, 3072, 29190], "EPSG:29190 is not supported (docs/inputs/TERRAIN.md"),
+        (&[1024, 1, 1025, 1, 3072, 29190], "EPSG:29190 is not supported (docs/reference/inputs/TERRAIN.md"),
         (&[1024, 1, 1025, 1, 3072, 32632, 3076, 9002], "the horizontal unit has EPSG code 9002"),
         (&[1024, 1, 1025, 1, 3072, 2230, 3076, 9001], "the horizontal unit has EPSG code 9001"),
         (

@@ -10,7 +10,7 @@
 //! the machine has.
 //!
 //! A software adapter runs on the same processor as the cpu renderer, which takes half of its time for the
-//! plans that it vectorises (docs/DECISIONS.md, "Cpu renderer").
+//! plans that it vectorises (docs/theory/DECISIONS.md, "Cpu renderer").
 
 use camsim_core::{
     scenario::Preset,

@@ -5,7 +5,7 @@
 //! `benches/all_effects.toml` and `benches/houses.toml`, with an exposure and without, and in two cases of
 //! `camsim bench`, each with ideal frames of 1 to 2.5 times the camera's scale, all stages of reading surfaces
 //! and the ideal frame, and 3 or 16 samples of the exposure; and from the GPU renderer's times for rays at
-//! silhouettes (docs/PERFORMANCE.md, "What a frame costs").
+//! silhouettes (docs/theory/PERFORMANCE.md, "What a frame costs").
 
 #[cfg(test)]
 mod tests;

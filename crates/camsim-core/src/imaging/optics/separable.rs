@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{RGBA, put_row};
 
-/// Standard deviation above which the transform is faster (docs/IMAGING.md).
+/// Standard deviation above which the transform is faster (docs/theory/IMAGING.md).
 const MAX_SIGMA_PX: f64 = 8.0;
 /// Reach of the taps beyond which what is left of them changes no transfer function by 0.01.
 const LEAST_RADIUS: usize = 10;

@@ -1,11 +1,11 @@
-//! `docs/inputs/CAMERAS.md`, made from the importers' tables.
+//! `docs/reference/inputs/CAMERAS.md`, made from the importers' tables.
 
 use std::fmt::Write as _;
 
 use super::super::key_table::{COMMON_KEYS, KeyRow, Treatment};
 use super::*;
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/inputs/CAMERAS.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/inputs/CAMERAS.md");
 
 fn treatment_text(treatment: Treatment) -> String {
     match treatment {
@@ -52,7 +52,7 @@ fn page() -> String {
          `rolling_shutter_time`, `shutter_type`, `global_shutter`, `readout_direction`, `fps`, `frame_rate`, \
          ... with a unit suffix (`_ns`, `_us`, `_ms`, `_s`). Without a unit, the only one with a readout of \
          0.5 to 250 ms is used and reported. Contradicting values are refused. The readout time is the line \
-         delay times the rows of the picture (see CONVENTIONS.md).\n",
+         delay times the rows of the picture (see [CONVENTIONS.md](../../theory/CONVENTIONS.md)).\n",
     );
     for format in CameraFormat::ALL.into_iter().filter(|format| *format != CameraFormat::OpenCvFisheye) {
         write!(page, "\n## {}: `--format {}`\n", format.title(), format.name()).unwrap();
@@ -80,7 +80,10 @@ fn documentation_page_matches_the_tables() {
         std::fs::write(PAGE, &page).unwrap();
     }
     let written = std::fs::read_to_string(PAGE).unwrap_or_default();
-    assert!(written == page, "docs/inputs/CAMERAS.md differs from the tables: run with CAMSIM_BLESS=1");
+    assert!(
+        written == page,
+        "docs/reference/inputs/CAMERAS.md differs from the tables: run with CAMSIM_BLESS=1"
+    );
 }
 
 #[test]

@@ -127,9 +127,9 @@ impl<'a> Description<'a> {
             |error: toml::ser::Error| WriteError::Encode { path: path.clone(), message: error.to_string() };
         let text = toml::to_string(&self.file(counts)).map_err(encode)?;
         let head = format!(
-            "{MARK}the columns of {}.csv are defined in docs/SENSORS.md. The body's axes are forward, right, \
-             down;\n# T_body_sensor takes points of the sensor's axes to them. [scenario] has the keys of the \
-             scenario.\n",
+            "{MARK}the columns of {}.csv are defined in docs/guide/SENSORS.md. The body's axes are forward, \
+             right, down;\n# T_body_sensor takes points of the sensor's axes to them. [scenario] has the \
+             keys of the scenario.\n",
             self.name
         );
         write_atomic(&path, (head + &text).as_bytes())
