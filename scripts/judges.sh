@@ -18,7 +18,7 @@ if ! [ -x "$venv/bin/python" ]; then
     say "making $venv"
     "$python" -m venv "$venv" || { say "JUDGES SKIPPED: python3 has no venv (apt-get install python3-venv)"; rm -rf "$venv"; exit 0; }
 fi
-if ! "$venv/bin/python" -c "import cv2, duckdb, evo, mcap, numpy, OpenEXR, pycolmap, rosbags, yaml" 2>/dev/null; then
+if ! "$venv/bin/python" -c "import cv2, duckdb, evo, mcap, numpy, OpenEXR, pycolmap, rosbags, tombi, yaml" 2>/dev/null; then
     say "installing the readers into $venv"
     "$venv/bin/pip" install --quiet --requirement scripts/judges/requirements.txt ||
         { say "JUDGES SKIPPED: the packages of scripts/judges/requirements.txt could not be installed"; exit 0; }
@@ -49,6 +49,9 @@ judge colmap "$dir/gs/run" "$dir/fisheye/run" "$dir/rig/run"
 judge bag "$dir/gs/run" "$dir/fisheye/run"
 judge pictures "$dir/gs/run"
 judge settings "$dir/stereo/run"
+camsim schema -o "$dir/scenario.schema.json"
+camsim -q render --print-default > "$dir/default.toml"
+judge schema "$dir/scenario.schema.json" "$dir/default.toml" "$dir/gs.toml" assets/demo.toml examples/propeller/propeller.toml
 calib="$dir/calibrations"
 "$venv/bin/python" scripts/judges/calibrations.py make "$calib"
 for camera in radtan rational prism fisheye; do

@@ -23,6 +23,7 @@ from ._errors import AdapterError, Error, InputError, RunError, ScenarioWarning
 from .frame import Frame, Rows, Source
 from .frames import Frames
 from .inputs import HeightMap, PoseTable
+from .keys import Keys
 from .lens import Lens
 from .pictures import Applied, Board, Comparison, Flow, Poses, Twist, apply, board, compare, verify
 from .randomize import (
@@ -70,6 +71,7 @@ __all__ = [
     "ImuSamples",
     "InputError",
     "Integer",
+    "Keys",
     "Lens",
     "LogUniform",
     "Normal",

@@ -15,6 +15,7 @@ from ._errors import InputError, ScenarioWarning, forget_paths, in_users_words, 
 from .frame import Frame
 from .frames import Frames, channel_names, frame_number
 from .inputs import InputFiles
+from .keys import Keys
 from .lens import Lens
 from .randomize import Variations
 from .trajectory import BarometerSamples, GnssSamples, ImuSamples, MagnetometerSamples, Trajectory
@@ -51,7 +52,7 @@ class Scenario(Sequence[Frame]):
         cls,
         path: Path,
         *,
-        sets: Mapping[str, Any] | None = None,
+        sets: Keys | Mapping[str, Any] | None = None,
         camera: str | None = None,
         preset: str | None = None,
         backend: str = "auto",
@@ -134,7 +135,7 @@ class Scenario(Sequence[Frame]):
         native = self._native.changed(_set_pairs({key: value}, self._files))
         self._native.take(native)
 
-    def replace(self, sets: Mapping[str, Any]) -> Scenario:
+    def replace(self, sets: Keys | Mapping[str, Any]) -> Scenario:
         """A copy with changed keys. What they do not touch (log, scene) is shared, and loaded once.
 
         Tables are merged key by key, so ``{"camera": {"fps": 10}}`` is ``{"camera.fps": 10}`` and leaves the rest of
@@ -356,7 +357,7 @@ class Scenario(Sequence[Frame]):
     __hash__ = object.__hash__
 
 
-def load_rig(path: Path, *, sets: Mapping[str, Any] | None = None, backend: str = "auto") -> dict[str, Scenario]:
+def load_rig(path: Path, *, sets: Keys | Mapping[str, Any] | None = None, backend: str = "auto") -> dict[str, Scenario]:
     """The scenarios of all cameras of a file with `[[cameras]]`, by name; log and scene are read once.
 
     >>> rig = camsim.load_rig("stereo.toml")
@@ -371,7 +372,7 @@ def default_scenario() -> str:
     return _camsim.default_scenario()
 
 
-def _set_pairs(sets: Mapping[str, Any], files: InputFiles) -> list[tuple[str, str]]:
+def _set_pairs(sets: Keys | Mapping[str, Any], files: InputFiles) -> list[tuple[str, str]]:
     if not isinstance(sets, Mapping):
         raise TypeError(f'sets: a dict is needed, {{"camera.fps": 10}}, not {type(sets).__name__}')
     pairs: list[tuple[str, str]] = []

@@ -126,9 +126,8 @@ fn no_camera(rig: &Rig, name: &str) -> PyErr {
 }
 
 fn channel(name: &str) -> PyResult<Channel> {
-    let known = Channel::ALL.into_iter().find(|channel| channel.name() == name);
-    known.ok_or_else(|| {
-        let names = Channel::ALL.map(Channel::name).join(", ");
+    Channel::named(name).ok_or_else(|| {
+        let names = Channel::NAMES.join(", ");
         input_error(format!("channel {name:?}: there is no such channel; the channels are {names}"))
     })
 }

@@ -17,6 +17,7 @@ pub mod merge;
 pub mod render;
 #[cfg(feature = "lab")]
 pub mod reproduce;
+pub mod schema;
 pub mod track;
 pub mod verify;
 #[cfg(feature = "viewer")]

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use camsim_core::{
     flight_log::FlightLog,
-    scenario::{Preset, Rig, Scenario},
+    scenario::{Preset, Rig, Scenario, keys::Key},
     tracker::TrackResult,
 };
 use camsim_io::{
     load::{Loaded, flight_warnings, load_flight, load_sequence, reload_rig, reload_sequence},
-    scenario_file::{RandomScenario, read_random_scenario},
+    scenario_file::{RandomScenario, ValueKind, keys, read_random_scenario},
 };
+use clap::builder::{PossibleValue, TypedValueParser};
 
 use crate::{
     console::Console,
@@ -38,7 +39,7 @@ pub struct ScenarioArgs {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Changes {
     /// Change a key of the scenario: --set camera.shutter.readout_ms=0 (may be repeated)
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_set)]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = SetParser, hide_possible_values = true)]
     pub sets: Vec<(String, String)>,
     /// Set of methods: camsim's own, or the paper's
     #[arg(long, value_enum)]
@@ -64,6 +65,29 @@ pub enum PresetArg {
     Default,
     /// The methods and approximations of the paper
     Paper,
+}
+
+/// Parser of `--set`, which completes the keys.
+#[derive(Clone, Debug)]
+struct SetParser;
+
+impl TypedValueParser for SetParser {
+    type Value = (String, String);
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<Self::Value, clap::Error> {
+        parse_set.parse_ref(command, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let keys = keys().iter().filter(|key| key.field.kind != ValueKind::Tables);
+        let value = |key: &Key| PossibleValue::new(format!("{}=", key.name)).help(key.field.summary());
+        Some(Box::new(keys.map(value)))
+    }
 }
 
 fn parse_set(text: &str) -> Result<(String, String), String> {

@@ -92,6 +92,7 @@ enum Command {
     Info(commands::info::InfoArgs),
     #[cfg(feature = "viewer")]
     Viewer(commands::viewer::ViewerArgs),
+    Schema(commands::schema::SchemaArgs),
     Completions(commands::completions::CompletionsArgs),
 }
 
@@ -141,6 +142,7 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Info(args) => commands::info::run(&args, console),
         #[cfg(feature = "viewer")]
         Command::Viewer(args) => commands::viewer::run(&args),
+        Command::Schema(args) => commands::schema::run(&args, console),
         Command::Completions(args) => commands::completions::run::<Cli>(&args, console),
     }
 }

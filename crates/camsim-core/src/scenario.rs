@@ -8,7 +8,10 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::timing_faults::picture_of;
+use crate::{
+    temporal::{MAX_KEYS, SAMPLES},
+    timing_faults::picture_of,
+};
 
 mod auto;
 mod auto_exposure;
@@ -18,6 +21,7 @@ mod dataset;
 mod face;
 mod file_list;
 mod image_sensor;
+pub mod keys;
 mod motion;
 mod optics;
 mod point_spread;
@@ -67,43 +71,41 @@ pub use validate::{
 };
 pub use video::{ImageFormat, RawFormat, VideoCodec, VideoSpec};
 
+use keys::{Table, Words};
+
 #[cfg(test)]
 pub(crate) use validate::tests::good as good_scenario;
 
 /// All inputs of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct Scenario {
-    /// Seed of all random numbers of the run.
-    #[serde(default)]
+    /// Seed of all random numbers. The same seed gives the same noise, hence the same pictures.
     pub seed: u64,
     /// The flight log and how it is read.
     pub flight: FlightSpec,
     /// How the camera platform follows the log.
-    #[serde(default)]
     pub tracker: TrackerSpec,
     /// The camera and all its imperfections.
-    #[serde(default)]
     pub camera: CameraSpec,
-    /// The scene.
+    /// The scene: terrain, a pattern, a board, models, or several of them.
+    #[key(required)]
     pub scene: SceneSpec,
     /// Tolerances and methods.
-    #[serde(default)]
     pub quality: QualitySpec,
     /// Output channels and formats.
-    #[serde(default)]
     pub output: OutputSpec,
-    /// Inertial measurement units.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Inertial measurement units beside the camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub imu: Vec<ImuSpec>,
-    /// Satellite receivers.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Satellite receivers beside the camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gnss: Vec<GnssSpec>,
-    /// Barometers.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Barometers beside the camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub barometer: Vec<BarometerSpec>,
-    /// Magnetometers.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Magnetometers beside the camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub magnetometer: Vec<MagnetometerSpec>,
 }
 
@@ -111,19 +113,7 @@ impl Scenario {
     /// This flight over this scene; all other keys have their defaults.
     #[must_use]
     pub fn new(flight: FlightSpec, scene: SceneSpec) -> Self {
-        Self {
-            seed: 0,
-            flight,
-            tracker: TrackerSpec::default(),
-            camera: CameraSpec::default(),
-            scene,
-            quality: QualitySpec::default(),
-            output: OutputSpec::default(),
-            imu: Vec::new(),
-            gnss: Vec::new(),
-            barometer: Vec::new(),
-            magnetometer: Vec::new(),
-        }
+        Self { flight, scene, ..Self::default() }
     }
 
     /// Seed of the camera's noise, from the scenario's seed and the camera's name.
@@ -140,44 +130,48 @@ impl Scenario {
     }
 }
 
-/// `[flight]`: the log and the meaning of its columns.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// The flight log and the meaning of its columns.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct FlightSpec {
-    /// The log file.
+    /// The flight log: time, position and attitude (paper section 3).
+    #[key(required, example = "\"flight.csv\"")]
     pub log: PathBuf,
-    /// Column layout; `auto` detects it, or fails if it is ambiguous.
-    #[serde(default)]
+    /// Format of the log. `auto` detects it by content, and refuses a log that two formats fit.
     pub format: LogFormat,
-    /// Unit of times whose column does not name one.
-    #[serde(default)]
+    /// Unit of times whose column names none. `auto` refuses ambiguous values.
     pub time_unit: TimeUnit,
-    /// Unit of roll, pitch and yaw whose columns do not name one.
-    #[serde(default)]
+    /// Unit of roll, pitch and yaw whose columns name none. `auto` refuses ambiguous values.
     pub angle_unit: AngleUnit,
-    /// Whether angles wrap or count turns.
-    #[serde(default)]
+    /// Whether roll, pitch and yaw wrap or count turns.
     pub angles: AngleKind,
-    /// Source of the attitude.
-    #[serde(default)]
+    /// Source of the attitude: the log, or the flown path.
     pub attitude: AttitudeSource,
-    /// Origin of the local NED frame.
-    #[serde(default)]
+    /// Origin of the local north-east-down frame. `"first"` is the first good row of the log; a list is
+    /// latitude, longitude and height on WGS-84.
+    #[key(unit = "deg, deg, m", step = 0.0001, names = "lat lon h")]
     pub origin: Origin,
     /// Vertical reference of the log's heights.
-    #[serde(default)]
     pub height: HeightReference,
     /// Instrument of the heights, where a log has several.
-    #[serde(default)]
     pub height_from: HeightSource,
-    /// Stream of a log that has several: that of the positions and, behind a comma, that of the attitudes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Stream of a log that has several. It is that of the positions and, behind a comma, that of the
+    /// attitudes: `"GPS, ATT"`.
+    #[key(example = "\"/odom\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// Interval of the log that is flown, in seconds from its first good row; `None` is the whole log.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Part of the log that is flown: begin and end, counted from its first good row. Left out: all of it.
+    #[key(unit = "s", step = 0.05, example = "[0.0, 20.0]", names = "from to")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub window_s: Option<[f64; 2]>,
-    /// Time scale: 2 flies the log twice as fast.
-    #[serde(default = "one")]
+    /// Speed-up of the log. 2 flies it twice as fast.
+    #[key(
+        default = 1.0,
+        unit = "x",
+        step = 0.01,
+        above = 0.0,
+        hint = "1 flies the log in its own time, 2 twice as fast"
+    )]
     pub speed: f64,
 }
 
@@ -185,28 +179,15 @@ impl FlightSpec {
     /// A log in a layout of its own marks; all other keys have their defaults.
     #[must_use]
     pub fn new(log: impl Into<PathBuf>) -> Self {
-        Self {
-            log: log.into(),
-            format: LogFormat::default(),
-            time_unit: TimeUnit::default(),
-            angle_unit: AngleUnit::default(),
-            angles: AngleKind::default(),
-            attitude: AttitudeSource::default(),
-            origin: Origin::default(),
-            height: HeightReference::default(),
-            height_from: HeightSource::default(),
-            topic: None,
-            window_s: None,
-            speed: one(),
-        }
+        Self { log: log.into(), ..Self::default() }
     }
 }
 
-/// Column layouts of flight logs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Formats of flight logs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum LogFormat {
-    /// Detected from header and values; an error if two layouts fit.
+    /// Detected from header and values; an error if two formats fit.
     #[default]
     Auto,
     /// `t, lat, lon, alt, roll, pitch, yaw` (degrees, metres up).
@@ -234,7 +215,7 @@ pub enum LogFormat {
 }
 
 /// Instrument of the heights of a log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "lowercase")]
 pub enum HeightSource {
     /// That of satellite navigation where there is one, else that of air pressure, with a warning.
@@ -247,7 +228,7 @@ pub enum HeightSource {
 }
 
 /// Time units of a flight log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeUnit {
     /// Seconds, or a unit that the values imply beyond doubt; an error if in doubt.
@@ -268,7 +249,7 @@ pub enum TimeUnit {
 }
 
 /// Units of roll, pitch and yaw in a flight log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "lowercase")]
 pub enum AngleUnit {
     /// Degrees, or a unit that the values imply beyond doubt; an error if in doubt.
@@ -281,20 +262,20 @@ pub enum AngleUnit {
 }
 
 /// Interpretation of Euler angles in a log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum AngleKind {
-    /// `Wrapped`, unless a column leaves both [-180, 180] and [0, 360).
+    /// `wrapped`, unless a column leaves both [-180, 180] and [0, 360).
     #[default]
     Auto,
     /// Rotation by the shorter way between two rows.
     Wrapped,
-    /// As written: from 0 to 360 is a full turn.
+    /// As written, turns count: from 0 to 360 is a full turn.
     Continuous,
 }
 
 /// Source of the platform's attitude.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum AttitudeSource {
     /// The log's own columns.
@@ -316,22 +297,28 @@ pub enum Origin {
     Geodetic([f64; 3]),
 }
 
-/// `[tracker]`: limits and method of the platform's motion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Method and limits of the platform's motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerSpec {
-    /// The method.
+    /// Method by which the platform follows the log.
     pub kind: TrackerKind,
-    /// Control rate of `sqrt`, knot rate of `spline`, hertz.
+    /// Control rate of `sqrt`, or knot rate of `spline`.
+    #[key(default = 400.0, unit = "Hz", min = 1.0, max = 100_000.0, hint = "400 is the default")]
     pub rate_hz: f64,
-    /// Speed limit; `auto` is 1.2 times the 99.9th percentile of the log's own speed.
+    /// Limit of the speed (the paper's v_max). `auto`: 1.2 times the 99.9th percentile of the log's own.
+    #[key(unit = "m/s", step = 0.1, above = 0.0, hint = "or write \"auto\"")]
     pub max_speed_m_s: Auto<f64>,
-    /// Acceleration limit; `auto` is 1.5 times the 99.9th percentile of the smoothed log's own, and at least
-    /// the paper's 19.6. With the paper's preset it is 19.6.
+    /// Limit of the acceleration (the paper's a_max). `auto`: 1.5 times the 99.9th percentile of the smoothed
+    /// log's own, and at least 19.6 (2 g, the paper's). With `quality.preset = "paper"`, `auto` is 19.6.
+    #[key(unit = "m/s2", step = 0.1, above = 0.0, hint = "or write \"auto\"")]
     pub max_acceleration_m_s2: Auto<f64>,
-    /// Angular rate limit; `auto` as for speed.
+    /// Limit of the angular rate about the body's axes. `auto`: as of `max_speed_m_s`.
+    #[key(unit = "deg/s", step = 0.1, above = 0.0, hint = "or write \"auto\"")]
     pub max_angular_rate_deg_s: Auto<f64>,
-    /// Angular acceleration limit; `auto` as for acceleration, with the paper's 60.
+    /// Limit of the angular acceleration. `auto`: as of `max_acceleration_m_s2`, with 60 (the paper's) in
+    /// place of 19.6.
+    #[key(unit = "deg/s2", step = 0.5, above = 0.0, hint = "or write \"auto\"")]
     pub max_angular_acceleration_deg_s2: Auto<f64>,
 }
 
@@ -355,97 +342,91 @@ impl Scenario {
     }
 }
 
-impl Default for TrackerSpec {
-    fn default() -> Self {
-        Self {
-            kind: TrackerKind::Sqrt,
-            rate_hz: 400.0,
-            max_speed_m_s: Auto::Auto,
-            max_acceleration_m_s2: Auto::Auto,
-            max_angular_rate_deg_s: Auto::Auto,
-            max_angular_acceleration_deg_s2: Auto::Auto,
-        }
-    }
-}
-
 /// Methods by which the platform follows the log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrackerKind {
     /// The pose of the latest row.
     Hold,
-    /// Straight lines and slerp between rows.
+    /// Straight lines and constant rotation (slerp) between rows.
     Linear,
-    /// Two nested SQRT loops per channel (paper section 3).
+    /// The paper's pair of nested SQRT loops per channel (section 3).
     #[default]
     Sqrt,
     /// Cubic B-spline fitted to the whole log under the limits.
     Spline,
 }
 
-/// `[quality]`: tolerances and methods.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Tolerances and methods.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct QualitySpec {
-    /// Set of methods: camsim's own, or the paper's.
+    /// Set of methods: camsim's own, or the paper's for comparison. With `paper`, `max_error_px` and
+    /// `max_error_dn` are ignored.
     pub preset: Preset,
-    /// Bound on the 99th percentile of the source error over valid pixels.
+    /// Tolerance of the error of source coordinates: its 99th percentile over valid pixels.
+    #[key(default = 0.05, unit = "px", step = 0.001, above = 0.0, hint = "0.05 is the default")]
     pub max_error_px: f64,
-    /// Bound on the RMS picture error in DN (1/255 of the linear range): resampling, exposure sampling,
-    /// misregistration, terrain level of detail, and silhouettes.
+    /// Tolerance of the RMS picture error in DN (1/255 of the linear range). It covers resampling, exposure
+    /// sampling, misregistration, the terrain's level of detail, and silhouettes.
+    #[key(default = 1.0, unit = "1/255", step = 0.01, above = 0.0, hint = "1 is the default")]
     pub max_error_dn: f64,
-    /// Bound on the displacement by the terrain's level of detail, output pixels. Its picture error counts in
-    /// `max_error_dn`.
+    /// Tolerance of the displacement by the terrain's level of detail, in output pixels. Its picture error
+    /// counts in `max_error_dn`.
+    #[key(default = 0.25, unit = "px", step = 0.01, above = 0.0, hint = "0.25 is the default")]
     pub max_terrain_error_px: f64,
-    /// Temporal inverse.
+    /// Method of the temporal inverse.
     pub solver: Auto<Solver>,
-    /// Depth look-ups of `reproject`, at most [`MAX_ITERATIONS`].
+    /// Depth look-ups of `solver = "reproject"`.
+    #[key(
+        step = 0.1,
+        min = 1,
+        max = MAX_ITERATIONS,
+        hint = "leave it out or write \"auto\" for the planner's choice"
+    )]
     pub iterations: Auto<u32>,
-    /// Exposure samples per pixel of path; with the paper preset, samples per exposure. At most
-    /// [`MAX_BLUR_SAMPLES`].
+    /// Exposure samples per pixel of path, and of each pixel of the picture, at most. With
+    /// `preset = "paper"`, each pixel has exactly so many.
+    #[key(
+        step = 0.1,
+        min = 1,
+        max = MAX_BLUR_SAMPLES,
+        hint = "leave it out or write \"auto\" for the planner's choice"
+    )]
     pub blur_samples: Auto<u32>,
-    /// Footprint taps per axis of an output pixel, at most [`MAX_FOOTPRINT_TAPS`].
+    /// Footprint taps along each side of an output pixel, at most.
+    #[key(
+        step = 0.1,
+        min = 1,
+        max = MAX_FOOTPRINT_TAPS,
+        hint = "leave it out or write \"auto\" for the planner's choice"
+    )]
     pub footprint_taps: Auto<u32>,
-    /// Ideal pixels per camera pixel along a side.
+    /// Pixels of the ideal frame per camera pixel, along a side.
+    #[key(step = 0.01, min = 1.0, max = 5.0, hint = "or write \"auto\"")]
     pub ideal_scale: Auto<f64>,
-    /// Samples per pixel of the ideal frame, 1 or 4. Several samples locate borders within a pixel.
+    /// Samples per pixel of the ideal frame, 1 or 4. With 4, borders are located within a pixel and smoother.
+    #[key(min = 1, max = SAMPLES, hint = "write 1, 4 or \"auto\"")]
     pub ideal_samples: Auto<u32>,
     /// Ideal frames per output frame.
+    #[key(step = 0.05, min = 1, max = MAX_KEYS, hint = "or write \"auto\"")]
     pub key_frames: Auto<u32>,
-    /// Largest number of output frames rendered from one ideal frame, at most [`MAX_FRAMES_PER_IDEAL`].
-    #[serde(default = "frames_per_ideal")]
+    /// Most output frames that are made from one ideal frame. That happens where it keeps the tolerances in
+    /// less time.
+    #[key(
+        default = 8,
+        step = 0.1,
+        min = 1,
+        max = MAX_FRAMES_PER_IDEAL,
+        hint = "1 gives each frame its own; 8 is the default"
+    )]
     pub frames_per_ideal: u32,
-    /// Method for pixels at silhouettes.
-    #[serde(default)]
+    /// Method for pixels at silhouettes, the borders of surfaces.
     pub silhouettes: Silhouettes,
 }
 
-impl Default for QualitySpec {
-    fn default() -> Self {
-        Self {
-            preset: Preset::Default,
-            max_error_px: 0.05,
-            max_error_dn: 1.0,
-            max_terrain_error_px: 0.25,
-            solver: Auto::Auto,
-            iterations: Auto::Auto,
-            blur_samples: Auto::Auto,
-            footprint_taps: Auto::Auto,
-            ideal_scale: Auto::Auto,
-            ideal_samples: Auto::Auto,
-            key_frames: Auto::Auto,
-            frames_per_ideal: frames_per_ideal(),
-            silhouettes: Silhouettes::Auto,
-        }
-    }
-}
-
-fn frames_per_ideal() -> u32 {
-    8
-}
-
 /// Sets of methods.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// The cheapest methods that keep the tolerances.
@@ -458,7 +439,7 @@ pub enum Preset {
 }
 
 /// Methods for pixels at silhouettes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Silhouettes {
     /// `plain` if it is expected to keep `max_error_dn`, otherwise `rays`.
@@ -472,7 +453,7 @@ pub enum Silhouettes {
 }
 
 /// Methods of the temporal inverse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
     /// One straight step at constant velocity and depth (eq. 16 of the paper).
@@ -481,89 +462,78 @@ pub enum Solver {
     Rk2,
     /// Exact relative pose per row and sample, depth by fixed-point iteration.
     Reproject,
-    /// A ray in f64 on the CPU for every sample of every pixel: the reference, slow.
+    /// An exact ray on the CPU for every sample of every pixel: the reference, slow.
     Oracle,
 }
 
-/// `[output]`: channels and file formats.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Channels and file formats.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutputSpec {
-    /// Channels to write for each frame.
+    /// Channels written for each frame.
+    #[key(default = vec![Channel::Color])]
     pub channels: Vec<Channel>,
-    /// File formats; with none, frames are rendered and read back without being written.
+    /// File formats of colour. With none, frames are rendered and read back, but not encoded.
+    #[key(default = vec![ImageFormat::Exr])]
     pub format: Vec<ImageFormat>,
     /// Clock of all written stamps.
     pub stamps: Stamps,
-    /// With `stamps = "zero"`: time of that clock at the begin of the window, nanoseconds.
+    /// Time of the written clock at the begin of the window, with `stamps = "zero"`.
+    #[key(unit = "ns")]
     pub epoch_ns: u64,
-    /// Time that the trajectories cover.
+    /// Time that `trajectory.csv` and `camera_trajectory.csv` cover.
     #[serde(skip_serializing_if = "TrajectorySpan::is_frames")]
     pub trajectory: TrajectorySpan,
     /// Pixel type of EXR colour.
     pub exr_pixel: ExrPixel,
-    /// EXR compression.
+    /// Compression of EXR files.
     pub exr_compression: ExrCompression,
-    /// File format of `raw`.
+    /// File format of the channel `raw`.
     #[serde(skip_serializing_if = "RawFormat::is_default")]
     pub raw_format: RawFormat,
-    /// Encoding of `mp4` and `mkv`.
+    /// Encoding of `mp4` and `mkv`, by ffmpeg.
     #[serde(skip_serializing_if = "VideoSpec::is_default")]
     pub video: VideoSpec,
     /// Frames from one to the other of `flow` and `flow_back`.
+    #[key(
+        default = 1,
+        unit = "frames",
+        step = 0.1,
+        min = 1,
+        hint = "flow leads from frame i to frame i + flow_step"
+    )]
     pub flow_step: u32,
     /// Instant of the picture that `flow_global` leads to.
     pub flow_instant: FlowInstant,
-    /// Whether `object` and `class` get pictures in colour, for people, in `object_palette` and
-    /// `class_palette`.
+    /// Pictures of `object` and `class` in colour, in `object_palette` and `class_palette`.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub palette: bool,
-    /// Points whose pixel is written for every frame that sees them.
+    /// Points whose pixel `tracks.csv` has for every frame that sees them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracks: Option<TracksSpec>,
-    /// Twins of every frame, each in a folder of its own.
+    /// The same frames by a better camera, each twin in a folder of its own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub twin: Vec<TwinSpec>,
-    /// Layouts of other programs that are written at the end of a run, each in a folder of its own in `datasets`.
+    /// Layouts of other programs, made of the frames at the end of a run. Each has a folder of its own in
+    /// `datasets`.
+    #[key(example = "[\"euroc\", \"mcap\"]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub datasets: Vec<DatasetFormat>,
 }
 
-impl Default for OutputSpec {
-    fn default() -> Self {
-        Self {
-            channels: vec![Channel::Color],
-            format: vec![ImageFormat::Exr],
-            stamps: Stamps::Log,
-            epoch_ns: 0,
-            trajectory: TrajectorySpan::Frames,
-            exr_pixel: ExrPixel::Half,
-            exr_compression: ExrCompression::Zip1,
-            raw_format: RawFormat::Png,
-            video: VideoSpec::default(),
-            flow_step: 1,
-            flow_instant: FlowInstant::Centre,
-            palette: false,
-            tracks: None,
-            twin: Vec::new(),
-            datasets: Vec::new(),
-        }
-    }
-}
-
 /// Clocks of stamps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stamps {
     /// The clock of the log.
     #[default]
     Log,
-    /// A clock that shows [`OutputSpec::epoch_ns`] at the begin of `flight.window_s`.
+    /// A clock that shows `output.epoch_ns` at the begin of `flight.window_s`.
     Zero,
 }
 
 /// Time that `trajectory.csv` and `camera_trajectory.csv` cover.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrajectorySpan {
     /// That of the frames in the folder; with sensors beside the camera, that of the flight.
@@ -602,7 +572,7 @@ impl OutputSpec {
 }
 
 /// Pixel type of EXR colour channels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExrPixel {
     /// 16 bit floating point.
@@ -613,7 +583,7 @@ pub enum ExrPixel {
 }
 
 /// EXR compression methods.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExrCompression {
     /// Uncompressed.
@@ -627,8 +597,4 @@ pub enum ExrCompression {
     Zip16,
     /// Wavelet.
     Piz,
-}
-
-fn one() -> f64 {
-    1.0
 }

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 pub(crate) mod check;
 mod escapes;
+mod listing;
 mod paths;
 mod randomize;
 mod rig;
@@ -20,13 +21,14 @@ mod similar;
 pub(crate) mod tree;
 mod wrong_file_kind;
 
+pub use listing::{json_schema, print_default};
 pub(crate) use paths::for_each_path;
 pub use randomize::{
     Drawn, RANDOMIZE, RandomScenario, Variation, VariationRecord, drawn_json, parse_random_scenario,
     randomize, read_random_scenario,
 };
 pub use rig::{rig_json, rig_of_table, rig_table};
-pub use schema::{CAMERAS, ValueKind};
+pub use schema::{CAMERAS, ValueKind, find_key, keys, kinds};
 use tree::Tree;
 pub use tree::UNSET;
 
@@ -203,18 +205,6 @@ pub fn read_checked_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
         format!("{}: {}", path.display(), problem.to_string().trim_start_matches("camera."))
     };
     Err(ScenarioError::Problems(problems.iter().map(line).collect()))
-}
-
-/// The commented default scenario that `camsim render --print-default` prints.
-pub fn print_default() -> String {
-    include_str!("scenario_file/default.toml").to_owned()
-}
-
-/// Every key of a scenario file and the values it takes, in the order of `--print-default`, without indices
-/// of array elements.
-#[must_use]
-pub fn keys() -> &'static [(&'static str, ValueKind)] {
-    schema::SCENARIO.keys
 }
 
 /// Turns a tree into checked scenarios, with `camera.resized` applied.

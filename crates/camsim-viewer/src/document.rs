@@ -11,7 +11,7 @@ use std::{
 
 use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, checked_rig};
 use camsim_io::{
-    scenario_file::{CAMERAS, ValueKind, keys, read_random_scenario, rig_of_table, rig_table},
+    scenario_file::{CAMERAS, ValueKind, kinds, read_random_scenario, rig_of_table, rig_table},
     write::write_atomic,
 };
 use toml::{Table, Value};
@@ -329,28 +329,27 @@ fn tree_of(rig: &Rig) -> Result<Table, String> {
 /// Keys of all paths in a tree, with elements of lists by index.
 fn path_keys(tree: &Table) -> Vec<String> {
     let split_list_key = |key: &str| {
-        let lists = keys().iter().filter(|(_, kind)| *kind == ValueKind::Tables).map(|(list, _)| *list);
+        let lists = kinds().filter(|&(_, kind)| kind == ValueKind::Tables).map(|(list, _)| list);
         lists
             .filter_map(|list| Some((list, key.strip_prefix(list)?.strip_prefix('.')?)))
             .map(|(list, leaf)| (list.to_owned(), leaf.to_owned()))
             .next()
     };
-    let paths = keys().iter().filter(|(_, kind)| *kind == ValueKind::Path);
+    let paths = kinds().filter(|&(_, kind)| kind == ValueKind::Path);
     let cameras = tree.get(CAMERAS).and_then(Value::as_array).map_or(0, Vec::len);
     let expanded = paths.flat_map(|(key, _)| match split_list_key(key) {
         None => match key.strip_prefix("camera.").filter(|_| cameras > 0) {
             Some(rest) => (0..cameras).map(|index| format!("{CAMERAS}.{index}.{rest}")).collect(),
-            None => vec![(*key).to_owned()],
+            None => vec![key.to_owned()],
         },
         Some((list, leaf)) => {
             let count = get_key(tree, &list).and_then(Value::as_array).map_or(0, Vec::len);
             (0..count).map(|index| format!("{list}.{index}.{leaf}")).collect()
         }
     });
-    let mixed =
-        keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::WordsOrTables(_) | ValueKind::Paths));
+    let mixed = kinds().filter(|(_, kind)| matches!(kind, ValueKind::WordsOrTables(_) | ValueKind::Paths));
     let tables = mixed.flat_map(|(key, kind)| match get_key(tree, key) {
-        Some(Value::String(text)) if kind.is_path(text) => vec![(*key).to_owned()],
+        Some(Value::String(text)) if kind.is_path(text) => vec![key.to_owned()],
         Some(Value::Array(list)) => {
             let is_path = |element: &Value| element.as_str().is_some_and(|text| kind.is_path(text));
             let paths = list.iter().enumerate().filter(|(_, element)| is_path(element));

@@ -20,7 +20,6 @@
 //! | `panes` | the panes and their widgets |
 //! | `engine` | threads that load and render |
 //! | `series`, `motion`, `orbit` | computations for plots, overlays and the 3D view |
-//! | `params` | unit, range and meaning of each key of a scenario |
 //! | `display_image`, `fonts` | images and glyphs on the screen |
 //! | `dropped_files`, `file_dialog`, `export` | files in and out |
 //! | `headless`, `frame_rate` | pictures without a window, and measurements |
@@ -42,7 +41,6 @@ mod message;
 mod motion;
 mod orbit;
 mod panes;
-mod params;
 mod series;
 mod settings;
 mod state;

@@ -65,10 +65,8 @@ pub struct ExportArgs {
 }
 
 fn format_parser() -> impl TypedValueParser<Value = DatasetFormat> {
-    PossibleValuesParser::new(DatasetFormat::ALL.map(DatasetFormat::name)).try_map(|name| {
-        let known = DatasetFormat::ALL.into_iter().find(|known| known.name() == name);
-        known.ok_or_else(|| format!("`{name}` is not a layout"))
-    })
+    PossibleValuesParser::new(DatasetFormat::NAMES)
+        .try_map(|name| DatasetFormat::named(&name).ok_or_else(|| format!("`{name}` is not a layout")))
 }
 
 /// Exports a folder or a scenario.

@@ -162,10 +162,8 @@ enum FormatArg {
 }
 
 fn channel_parser() -> impl TypedValueParser<Value = Channel> {
-    PossibleValuesParser::new(Channel::ALL.map(Channel::name)).try_map(|name| {
-        let known = Channel::ALL.into_iter().find(|known| known.name() == name);
-        known.ok_or_else(|| format!("`{name}` is not a channel"))
-    })
+    PossibleValuesParser::new(Channel::NAMES)
+        .try_map(|name| Channel::named(&name).ok_or_else(|| format!("`{name}` is not a channel")))
 }
 
 /// Renders a scenario, and writes its datasets.

@@ -2,52 +2,81 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Automatic exposure. Every frame's exposure time and gain follow from the pictures before it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+use super::keys::{Table, Words};
+
+/// Exposure time and gain of every frame, by the pictures before it (docs/reference/IMAGING.md).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutoExposureSpec {
-    /// Metered part of the picture: left, top, right and bottom as shares of its sides.
+    /// Metered part of the picture: left, top, right, bottom, as shares of its sides.
+    #[key(
+        default = [0.0, 0.0, 1.0, 1.0],
+        step = 0.005,
+        min = 0.0,
+        max = 1.0,
+        hint = "give [left, top, right, bottom]",
+        names = "left top right bottom"
+    )]
     pub window: [f64; 4],
-    /// What counts how much within the window.
+    /// Weights within the metered window.
     pub weights: MeterWeights,
-    /// Mean that is aimed at: a share of white, or of the range of the sensor's digital numbers above black.
+    /// Mean that is aimed at, as a share of white. Of an image sensor it is a share of the range of its
+    /// numbers above black.
+    #[key(
+        default = 0.18,
+        step = 0.005,
+        above = 0.0,
+        below = 1.0,
+        hint = "0 is black, 1 is white, 0.18 is a middle grey"
+    )]
     pub target: f64,
     /// Shortest and longest exposure time.
+    #[key(
+        default = [0.02, 20.0],
+        unit = "ms",
+        step = 0.1,
+        above = 0.0,
+        hint = "give [smallest, largest], both above 0; two equal numbers fix the value",
+        names = "min max"
+    )]
     pub exposure_ms: [f64; 2],
-    /// Smallest and largest gain.
+    /// Smallest and largest gain on the light, or on the sensor's electrons. It divides
+    /// `camera.sensor.gain_e_per_dn`.
+    #[key(
+        default = [1.0, 16.0],
+        unit = "x",
+        step = 0.05,
+        above = 0.0,
+        hint = "give [smallest, largest], both above 0; two equal numbers fix the value",
+        names = "min max"
+    )]
     pub gain: [f64; 2],
     /// Share of the error's logarithm that each frame corrects.
+    #[key(default = 0.2, step = 0.005, above = 0.0, max = 1.0, hint = "1 corrects all of the error at once")]
     pub speed: f64,
-    /// How many frames before its own the picture is that a frame's exposure follows from.
+    /// Frames from the metered picture to the one whose exposure follows from it.
+    #[key(default = 1, min = 1, max = 1000, hint = "no frame is exposed by its own picture")]
     pub delay: u32,
     /// What grows first in the dark, and shrinks last in bright light.
     pub first: ExposureOrder,
     /// Exposure of frame 0.
     pub start: ExposureStart,
-    /// Exposure time that makes the scene's white white, with gain 1; else `camera.shutter.exposure_ms`.
+    /// Exposure time that makes the scene's white white with gain 1. Give it where
+    /// `camera.shutter.exposure_ms` is 0, for pictures of one instant. Left out:
+    /// `camera.shutter.exposure_ms`.
+    #[key(
+        unit = "ms",
+        step = 0.1,
+        above = 0.0,
+        hint = "leave it out for camera.shutter.exposure_ms",
+        example = "8.0"
+    )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nominal_ms: Option<f64>,
 }
 
-impl Default for AutoExposureSpec {
-    fn default() -> Self {
-        Self {
-            window: [0.0, 0.0, 1.0, 1.0],
-            weights: MeterWeights::Even,
-            target: 0.18,
-            exposure_ms: [0.02, 20.0],
-            gain: [1.0, 16.0],
-            speed: 0.2,
-            delay: 1,
-            first: ExposureOrder::Exposure,
-            start: ExposureStart::Settled,
-            nominal_ms: None,
-        }
-    }
-}
-
 /// Weights within the metered window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum MeterWeights {
     /// The same everywhere.
@@ -58,7 +87,7 @@ pub enum MeterWeights {
 }
 
 /// What grows first in the dark.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExposureOrder {
     /// The exposure time up to its limit, then the gain.
@@ -69,12 +98,12 @@ pub enum ExposureOrder {
 }
 
 /// Exposure of frame 0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExposureStart {
     /// What the camera would settle at if it always saw the picture of frame 0.
     #[default]
     Settled,
-    /// The nominal exposure time with gain 1, within the limits.
+    /// The exposure time of `nominal_ms` with gain 1, within the limits.
     Nominal,
 }

@@ -2,12 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::keys::Words;
+
 /// A channel of a frame (`output.channels`).
 ///
 /// All truth is that of the pixel's centre at the mid-exposure of its own row, on the distorted grid of the
 /// output frame, where nothing else is said. Pixels without a ray have zeros. Blended surfaces count where
 /// their alpha is 1/2 or more.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// The picture.
@@ -33,8 +35,7 @@ pub enum Channel {
     Object,
     /// Class of the object, as the scenario gives it; 0 = none.
     Class,
-    /// Share of the pixel's area and exposure that the object of [`Self::Object`] has, 0 to 1; 0 without a
-    /// ray.
+    /// Share of the pixel's area and exposure that its `object` has, 0 to 1; 0 without a ray.
     Coverage,
     /// Optical flow to frame i + `output.flow_step`, pixels: where that frame, at the time of its own rows,
     /// shows the point that the pixel sees. With a state.
@@ -79,51 +80,6 @@ pub enum FlowState {
 }
 
 impl Channel {
-    /// All channels.
-    pub const ALL: [Self; 17] = [
-        Self::Color,
-        Self::Depth,
-        Self::Valid,
-        Self::Rows,
-        Self::Raw,
-        Self::Coords,
-        Self::Range,
-        Self::Normal,
-        Self::NormalWorld,
-        Self::Object,
-        Self::Class,
-        Self::Coverage,
-        Self::Flow,
-        Self::FlowBack,
-        Self::FlowGlobal,
-        Self::Motion,
-        Self::BlurPath,
-    ];
-
-    /// Name in a scenario, of its folder and of its column in `frames.csv`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Color => "color",
-            Self::Depth => "depth",
-            Self::Valid => "valid",
-            Self::Rows => "rows",
-            Self::Raw => "raw",
-            Self::Coords => "coords",
-            Self::Range => "range",
-            Self::Normal => "normal",
-            Self::NormalWorld => "normal_world",
-            Self::Object => "object",
-            Self::Class => "class",
-            Self::Coverage => "coverage",
-            Self::Flow => "flow",
-            Self::FlowBack => "flow_back",
-            Self::FlowGlobal => "flow_global",
-            Self::Motion => "motion",
-            Self::BlurPath => "blur_path",
-        }
-    }
-
     /// What its plane holds ([`crate::frame::RenderedFrame::planes`]); `None` for the channels that have a
     /// field of their own.
     #[must_use]
@@ -155,7 +111,7 @@ impl Channel {
 }
 
 /// Instant of a picture with a global shutter: that `flow_global` leads to, or a twin.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum FlowInstant {
     /// Mid-exposure of the row that is read first.

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::keys::Words;
+
 /// A layout of files that other programs read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum DatasetFormat {
     /// EuRoC/ASL: `mav0`, with settings for ORB-SLAM3, OpenVINS and VINS-Fusion.
@@ -28,39 +30,4 @@ pub enum DatasetFormat {
     Webdataset,
     /// Middlebury `.flo`.
     Flo,
-}
-
-impl DatasetFormat {
-    /// All formats.
-    pub const ALL: [Self; 11] = [
-        Self::Euroc,
-        Self::Tum,
-        Self::Kitti,
-        Self::Colmap,
-        Self::Nerfstudio,
-        Self::Kalibr,
-        Self::Mcap,
-        Self::CarlaRs,
-        Self::Gopro,
-        Self::Webdataset,
-        Self::Flo,
-    ];
-
-    /// Name in a scenario, on the command line, and of its folder.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Euroc => "euroc",
-            Self::Tum => "tum",
-            Self::Kitti => "kitti",
-            Self::Colmap => "colmap",
-            Self::Nerfstudio => "nerfstudio",
-            Self::Kalibr => "kalibr",
-            Self::Mcap => "mcap",
-            Self::CarlaRs => "carla-rs",
-            Self::Gopro => "gopro",
-            Self::Webdataset => "webdataset",
-            Self::Flo => "flo",
-        }
-    }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{CameraSpec, LensModel, LensSpec, OutputEncoding};
+use super::{CameraSpec, LensModel, LensSpec, OutputEncoding, keys::Table};
 
 /// A primary colour of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,40 +40,54 @@ impl Primary {
     }
 }
 
-/// `[camera.chromatic]`: where red and blue are imaged, by a radial scale of green's image or by a lens each.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Lateral chromatic aberration: lenses of red and blue beside green's (docs/reference/LENSES.md).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChromaticSpec {
-    /// `[v, c, b]`: red is imaged `v + c r + b r^2` times as far from the principal point as green; r is
-    /// green's distance from it over half the picture's shorter side. Trailing terms may be left out.
+    /// Terms v, c, b of the distance of red from the principal point, over that of green. It is v + c r + b
+    /// r^2, with r the distance of green, 1 at half the picture's shorter side. Trailing terms may be left
+    /// out.
+    #[key(step = 0.0001, example = "[1.0006, 0.0, -0.0002]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub red_scale: Vec<f64>,
-    /// Likewise of blue.
+    /// Terms v, c, b of the distance of blue from the principal point, over that of green. It is v + c r + b
+    /// r^2, with r as in `red_scale`.
+    #[key(step = 0.0001, example = "[0.9995]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub blue_scale: Vec<f64>,
-    /// Red's own lens.
+    /// Red's own lens, in place of `red_scale`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub red: Option<PrimaryLensSpec>,
-    /// Blue's own lens.
+    /// Blue's own lens, in place of `blue_scale`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blue: Option<PrimaryLensSpec>,
 }
 
-/// `[camera.chromatic.red]`, `[camera.chromatic.blue]`: a calibration of one colour. What is left out is the
-/// camera's.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Calibration of one colour.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct PrimaryLensSpec {
-    /// Focal lengths.
+    /// Focal lengths of this colour. Left out: the camera's.
+    #[key(
+        unit = "px",
+        step = 0.1,
+        above = 0.0,
+        hint = "a 60 degree lens on 640 px has about 554",
+        example = "[500.3, 500.3]",
+        names = "fx fy"
+    )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_px: Option<[f64; 2]>,
-    /// Principal point.
+    /// Principal point of this colour. Left out: the camera's.
+    #[key(unit = "px", step = 0.05, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub principal_point_px: Option<[f64; 2]>,
-    /// Model.
+    /// Lens model of this colour. Left out: the camera's.
+    #[key(example = "\"brown-conrady\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<LensModel>,
-    /// Coefficients. Where they are left out with a model other than the camera's there are none.
+    /// Coefficients of this colour's lens. Left out: the camera's, or none with another model.
+    #[key(step = 0.0005, example = "[-0.28, 0.07]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients: Option<Vec<f64>>,
 }
@@ -107,35 +121,49 @@ impl ChromaticSpec {
     }
 }
 
-/// `[camera.image_circle]`: pixels beyond it have no ray.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Circle of the picture that the lens shows; pixels beyond it are invalid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageCircleSpec {
-    /// Radius.
+    /// Radius of the circle. Left out: no limit but `half_angle_deg`.
+    #[key(unit = "px", above = 0.0, hint = "pixels farther from centre_px are invalid", example = "300.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_px: Option<f64>,
-    /// Centre; `None` is the principal point.
+    /// Centre of the circle of `radius_px`. Left out: the principal point.
+    #[key(unit = "px", step = 0.5, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_px: Option<[f64; 2]>,
-    /// Largest angle of a ray to the optical axis.
+    /// Largest angle of a ray to the optical axis, in place of `radius_px` or beside it. Left out: no limit.
+    #[key(
+        unit = "deg",
+        step = 0.5,
+        above = 0.0,
+        max = 180.0,
+        hint = "it is an angle to the optical axis: a lens of 190 degrees has 95",
+        example = "95.0"
+    )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_angle_deg: Option<f64>,
 }
 
-/// `[camera.photometric.vignetting]`: a model of the light that reaches a pixel. It multiplies that of the map.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Model of the vignetting, which multiplies the map (docs/reference/IMAGING.md).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct VignettingSpec {
-    /// Power of the cosine of a ray's angle to the optical axis: 4 is natural vignetting, 0 none.
+    /// Power of the cosine of a ray's angle to the optical axis. 4 is natural vignetting, 0 none.
+    #[key(step = 0.1, min = 0.0, max = 100.0, hint = "4 is natural vignetting, 0 none")]
     pub cos_power: f64,
-    /// `[k1, k2, k3]` of `1 + k1 r^2 + k2 r^4 + k3 r^6`; r is the distance from the principal point over half
-    /// the picture's diagonal. Trailing terms may be left out.
+    /// Terms k1, k2, k3 of 1 + k1 r^2 + k2 r^4 + k3 r^6. r is the distance from the principal point, 1 at
+    /// half the picture's diagonal. Trailing terms may be left out.
+    #[key(step = 0.005, example = "[-0.3, 0.1, 0.0]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub polynomial: Vec<f64>,
-    /// Red's polynomial, instead of that of all.
+    /// Polynomial of red, in place of `polynomial`. Left out: that of all.
+    #[key(step = 0.005, example = "[-0.32]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomial_red: Option<Vec<f64>>,
-    /// Blue's polynomial, instead of that of all.
+    /// Polynomial of blue, in place of `polynomial`. Left out: that of all.
+    #[key(step = 0.005, example = "[-0.28]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomial_blue: Option<Vec<f64>>,
 }

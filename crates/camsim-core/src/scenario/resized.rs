@@ -12,27 +12,39 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     CameraSpec, ChromaticSpec, FieldOr, ImageCircleSpec, MAX_SIDE_PX, Parity, PointSpreadSpec,
-    PrimaryLensSpec, Problem, Readout, ShutterSpec, VignettingSpec, ZoomSpec,
+    PrimaryLensSpec, Problem, Readout, ShutterSpec, VignettingSpec, ZoomSpec, keys::Table,
 };
 
 mod sensor;
 #[cfg(test)]
 mod tests;
 
-/// Part and scale of the calibrated picture.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Part and scale of the picture that the camera delivers; the other keys follow (docs/guide/CAMERA_FILES.md).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ResizedSpec {
-    /// `[left, top, width, height]` of the part, pixels of the calibrated picture; `None` is all of it.
+    /// Part of the calibrated picture: left, top, width, height, in its pixels. Left out: all of it.
+    #[key(unit = "px", example = "[64, 48, 512, 384]", names = "left top width height")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop_px: Option<[u32; 4]>,
-    /// Pixels across and down that make one. Those that are left over on the right and below are not used.
+    /// Pixels across and down that make one: a number, or one of each. Those that are left over on the right
+    /// and below are not used. Left out: one pixel stays one.
+    #[key(step = 0.05, example = "2")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub binning: Option<Binning>,
-    /// Or: the factor on width and height, which are rounded.
+    /// Factor on width and height, which are rounded, in place of `binning`. Left out: no change.
+    #[key(step = 0.005, example = "0.5")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// Or: width and height of the delivered picture.
+    /// Width and height of the delivered picture, in place of `binning` and `scale`. Left out: by these.
+    #[key(
+        unit = "px",
+        min = 1,
+        max = MAX_SIDE_PX,
+        hint = "give [width, height]",
+        example = "[320, 240]",
+        names = "W H"
+    )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
 }
@@ -47,18 +59,36 @@ pub enum Binning {
     Each([f64; 2]),
 }
 
-/// `[camera.files_of]`: the picture that the files of `lens_table` and `photometric.vignette` are of, where that
-/// is not the camera's own. [`CameraSpec::resized`] writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Picture that the files of `lens_table` and `vignette` are of, where a resized camera was written.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct FilesOfSpec {
-    /// Its width and height.
+    /// Width and height of the picture that the files are of.
+    #[key(
+        required,
+        unit = "px",
+        min = 1,
+        hint = "give [width, height]",
+        example = "[640, 480]",
+        names = "W H"
+    )]
     pub size_px: [u32; 2],
-    /// Its focal lengths.
+    /// Focal lengths in that picture.
+    #[key(
+        required,
+        unit = "px",
+        step = 0.5,
+        above = 0.0,
+        hint = "a 60 degree lens on 640 px has about 554",
+        example = "[500.0, 500.0]",
+        names = "fx fy"
+    )]
     pub focal_px: [f64; 2],
-    /// Its principal point.
+    /// Principal point in that picture.
+    #[key(required, unit = "px", step = 0.05, example = "[319.5, 239.5]", names = "cx cy")]
     pub principal_point_px: [f64; 2],
-    /// `[left, top, width, height]` of the camera's picture in it, its pixels.
+    /// The camera's picture in that of the files: left, top, width, height, in its pixels.
+    #[key(required, unit = "px", example = "[64.0, 48.0, 512.0, 384.0]", names = "left top width height")]
     pub part_px: [f64; 4],
 }
 
@@ -69,8 +99,8 @@ pub struct MadeOf {
     pub is_part: bool,
     /// Factor across over that down: pixels that were square have this ratio of focal lengths.
     pub squeeze: f64,
-    /// By how much its rows are later than the same rows of the whole picture, milliseconds: the centre of a part
-    /// takes the time that the centre of the whole picture had.
+    /// By how much its rows are later than the same rows of the whole picture, milliseconds: the centre of a
+    /// part takes the time that the centre of the whole picture had.
     pub rows_later_ms: f64,
 }
 

@@ -4,96 +4,141 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{FileList, MotionSpec};
+use super::{
+    FileList, MotionSpec,
+    keys::{Table, Words},
+};
+
+/// Largest factor of the sky: half floats hold 65 504.
+const MOST_BRIGHTNESS: f64 = 10_000.0;
 
 /// The scene: one of its parts, or several together.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct SceneSpec {
-    /// Terrain from a DEM and an ortho-image.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Terrain from a DEM and an orthophoto.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainSpec>,
-    /// A planar image on the ground.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// A level image on the ground.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub pattern: Option<PatternSpec>,
     /// A calibration board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardSpec>,
-    /// glTF models.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Models (glTF), each at one place or at those of a placement table.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gltf: Vec<GltfSpec>,
-    /// Sky colour, sRGB.
-    #[serde(default = "sky")]
+    /// Colour of the sky.
+    #[key(
+        default = [0.65, 0.85, 1.0],
+        unit = "sRGB",
+        step = 0.005,
+        min = 0.0,
+        max = 1.0,
+        hint = "divide 8-bit values by 255",
+        names = "R G B"
+    )]
     pub sky: [f64; 3],
-    /// Factor of the sky's linear light, which may be brighter than white; else 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Factor of the sky's linear light. Above white it shows with `[camera.sensor]` or less exposure. Left
+    /// out: 1.
+    #[key(
+        unit = "x",
+        step = 0.01,
+        min = 0.0,
+        max = MOST_BRIGHTNESS,
+        hint = "1 leaves scene.sky as it is",
+        example = "1.0"
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub sky_brightness: Option<f64>,
-    /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), with the slant range d.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Visibility V in fog. Colour is mixed with the sky by 1 - exp(-3.912 d / V), with the slant range d.
+    /// Left out: clear air.
+    #[key(unit = "m", step = 50.0, above = 0.0, hint = "leave it out for clear air", example = "5000.0")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,
-    /// Sun and sky light. Without it, colours are used as they are.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Light of sun and sky on terrain and models. Left out: colours as they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub light: Option<LightSpec>,
 }
 
-/// `scene.light`: factor on the colours of terrain and models.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+/// Light of sun and sky, a factor on the colours of terrain and models.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct LightSpec {
-    /// Azimuth of the sun, degrees east of north.
+    /// Azimuth of the sun, east of north.
+    #[key(
+        default = 180.0,
+        unit = "deg",
+        step = 0.5,
+        min = -360.0,
+        max = 360.0,
+        hint = "it counts from north to east"
+    )]
     pub sun_azimuth_deg: f64,
-    /// Elevation of the sun above the horizon, degrees.
+    /// Elevation of the sun above the horizon.
+    #[key(
+        default = 45.0,
+        unit = "deg",
+        step = 0.2,
+        min = 0.0,
+        max = 90.0,
+        hint = "0 is on the horizon, 90 overhead; for a night set scene.light.sun = 0"
+    )]
     pub sun_elevation_deg: f64,
-    /// Factor of the sun on a surface that faces it.
+    /// Direct light: factor on a surface that faces the sun.
+    #[key(default = 0.8, unit = "x", step = 0.005, min = 0.0, max = 1.0)]
     pub sun: f64,
-    /// Factor of the sky on a surface that faces upwards; half of it on walls.
+    /// Diffuse light: factor on a surface that faces upwards, half of it on walls. `sun` + `sky` is at most
+    /// 1.
+    #[key(default = 0.2, unit = "x", step = 0.005, min = 0.0, max = 1.0)]
     pub sky: f64,
     /// Whether terrain and models keep the sun from what is behind them.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub shadows: bool,
 }
 
-impl Default for LightSpec {
-    fn default() -> Self {
-        Self { sun_azimuth_deg: 180.0, sun_elevation_deg: 45.0, sun: 0.8, sky: 0.2, shadows: false }
-    }
-}
-
-/// `scene.terrain`: the ground.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// The ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct TerrainSpec {
-    /// Heights: a GeoTIFF, ESRI ASCII grid or SRTM tile, or several tiles of one grid.
+    /// Heights: a GeoTIFF, ESRI ASCII grid or SRTM tile, or several tiles of one grid. Several are a list, a
+    /// folder, or a path with `*` and `?`.
+    #[key(required, example = "\"dem.tif\"")]
     pub dem: FileList,
-    /// Colour: a GeoTIFF, PNG, JPEG or WebP, or several tiles of one grid. Without a georeference it covers the
-    /// extent of the DEM.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Orthophoto: a GeoTIFF, PNG, JPEG or WebP, or several tiles of one grid as in `dem`. Without a
+    /// georeference it covers the extent of the DEM.
+    #[key(example = "\"ortho.tif\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ortho: Option<FileList>,
-    /// Vertical reference of the DEM.
-    #[serde(default)]
+    /// Vertical reference of the DEM's heights.
     pub height: HeightReference,
-    /// EPSG code, if the DEM does not state one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// EPSG code of the coordinate system, if the DEM states none.
+    #[key(max = u16::MAX, example = "32632")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub epsg: Option<u16>,
     /// Unit of the heights, if the DEM states none, or two.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[key(example = "\"m\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub height_unit: Option<HeightUnit>,
-    /// Stored value of white in the ortho-image; by default the largest value of its bits.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Stored value of white in the orthophoto, if it does not use all bits. Left out: the largest value of
+    /// its bits.
+    #[key(above = 0.0, hint = "give the stored value of white, 2047 for 11 bits", example = "2047.0")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ortho_white: Option<f64>,
-    /// Ground outside of the ortho-image.
-    #[serde(default)]
+    /// Appearance of ground beyond the orthophoto.
     pub beyond: Beyond,
-    /// Name of the object in `objects.csv`; `terrain` by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Name of the object in `objects.csv`. Left out: `terrain`.
+    #[key(example = "\"valley\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of the object, 1 to 65535; left out: 0, none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Class of the object. Left out: 0, none.
+    #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "1")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
 }
 
 /// Unit of heights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeightUnit {
     /// Metres.
@@ -125,156 +170,195 @@ impl HeightUnit {
     }
 }
 
-/// Ground without ortho-image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Ground without orthophoto.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Beyond {
     /// Neutral grey.
     #[default]
     Grey,
-    /// The colours of the ortho-image's border.
+    /// The colours of the orthophoto's border.
     Edge,
     /// No ground.
     Void,
 }
 
-/// `scene.pattern`: a level image at the height of the origin, with its top to the north.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A level image at the height of the origin, with its top to the north.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct PatternSpec {
     /// The image.
+    #[key(required, example = "\"grid.png\"")]
     pub image: PathBuf,
-    /// Width on the ground; the height follows from square pixels.
+    /// Width on the ground. The height follows from square pixels.
+    #[key(
+        required,
+        unit = "m",
+        above = 0.0,
+        hint = "give the width on the ground in metres",
+        example = "100.0"
+    )]
     pub width_m: f64,
-    /// Centre: `"origin"` or `[north_m, east_m, down_m]`.
-    #[serde(default)]
+    /// Centre: `"origin"` or north, east, down.
+    #[key(unit = "m", names = "N E D")]
     pub at: PatternCentre,
-    /// Name of the object in `objects.csv`; `pattern` by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Name of the object in `objects.csv`. Left out: `pattern`.
+    #[key(example = "\"grid\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of the object, 1 to 65535; left out: 0, none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Class of the object. Left out: 0, none.
+    #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "1")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
     /// Whether the image repeats over the plane, without seams, to the horizon.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub repeat: bool,
 }
 
-/// `scene.board`: a calibration board, by its parameters or by a target file of Kalibr.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A calibration board, by its parameters or by a target file of Kalibr.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct BoardSpec {
-    /// Target file (YAML) of Kalibr, in place of the parameters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Target file (YAML) of Kalibr, in place of `kind`, `columns`, `rows` and `size_m`.
+    #[key(example = "\"target.yaml\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<PathBuf>,
     /// Kind of board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[key(example = "\"chessboard\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<BoardKind>,
-    /// Number along the width: inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Number from left to right. Inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
+    #[key(step = 0.1, min = 1, max = 80, example = "9")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<u32>,
-    /// Number along the height: inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Number from top to bottom. Inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
+    #[key(step = 0.1, min = 1, max = 80, example = "6")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub rows: Option<u32>,
     /// Side of a square or tag, or the spacing of circles as OpenCV defines it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.05")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<f64>,
-    /// Height of a chessboard's squares, if different from their width.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Height of a chessboard's squares. Left out: their width.
+    #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.04")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub row_size_m: Option<f64>,
-    /// Diameter of a circle; half the spacing by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Diameter of a circle. Left out: half the spacing.
+    #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.025")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub diameter_m: Option<f64>,
-    /// Gap between tags of an AprilGrid, as a share of their side; 0.3 by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Gap between tags of an AprilGrid, as a share of their side. Left out: 0.3.
+    #[key(
+        step = 0.005,
+        above = 0.0,
+        max = 1.0,
+        hint = "give the gap between tags as a share of size_m",
+        example = "0.3"
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<f64>,
-    /// Side of a ChArUco board's markers; three quarters of a square by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Side of a ChArUco board's markers. Left out: three quarters of a square.
+    #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.0375")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub marker_m: Option<f64>,
-    /// Dictionary of a ChArUco board's markers; 4x4 by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Dictionary of a ChArUco board's markers. Left out: `4x4`.
+    #[key(example = "\"4x4\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub dictionary: Option<Dictionary>,
-    /// Number of the first tag or marker; 0 by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Number of the first tag or marker. Left out: 0.
+    #[key(step = 0.2, max = 586, example = "0")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<u32>,
-    /// Least width of the white margin; by default that usual for the kind of board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Least width of the white margin. Left out: that usual for the kind of board.
+    #[key(unit = "m", step = 0.001, min = 0.0, hint = "give metres, 0 or more", example = "0.05")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub margin_m: Option<f64>,
-    /// Position of the centre: `"origin"` or `[north_m, east_m, down_m]`.
-    #[serde(default)]
+    /// Position of the centre: `"origin"` or north, east, down.
+    #[key(unit = "m", step = 0.1, names = "N E D")]
     pub at: PatternCentre,
-    /// Geodetic position of the centre, in place of `at`: latitude and longitude in degrees, height in metres
-    /// in the datum of `flight.height`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Geodetic position of the centre, in place of `at`: latitude, longitude and height. The height is in
+    /// the datum of `flight.height`.
+    #[key(unit = "deg, deg, m", step = 0.1, example = "[46.75, 9.83, 1860.0]", names = "lat lon h")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
     /// Roll, pitch, yaw. At 0 0 0 the board lies face up with its top to the north; at pitch 90 it stands
     /// upright and faces a viewer who looks north.
-    #[serde(default)]
+    #[key(unit = "deg", step = 0.1, names = "roll pitch yaw")]
     pub angles_deg: [f64; 3],
-    /// Name of the object in `objects.csv`; `board` by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Name of the object in `objects.csv`. Left out: `board`.
+    #[key(example = "\"target\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of the object, 1 to 65535; left out: 0, none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Class of the object. Left out: 0, none.
+    #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "1")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
 }
 
-/// `[[scene.gltf]]`: a model, placed once or by a table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A model, placed once or by a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct GltfSpec {
     /// The model, a `.gltf` or `.glb` file.
+    #[key(required, example = "\"house.glb\"")]
     pub file: PathBuf,
-    /// Position of the model's origin: `"origin"` or `[north_m, east_m, down_m]`.
-    #[serde(default)]
+    /// Position of the model's origin: `"origin"` or north, east, down.
+    #[key(unit = "m", step = 0.1, names = "N E D")]
     pub at: PatternCentre,
-    /// Geodetic position of the model's origin, in place of `at`: latitude and longitude in degrees, height
-    /// in metres in the datum of `flight.height`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Geodetic position of the model's origin, in place of `at`: latitude, longitude and height. The height
+    /// is in the datum of `flight.height`.
+    #[key(unit = "deg, deg, m", step = 0.1, example = "[46.75, 9.83, 1860.0]", names = "lat lon h")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
-    /// Table of placements, in place of `at`: `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and optionally
-    /// `heading_deg` and `scale`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// CSV table of placements, in place of `at`. Its columns are `n_m,e_m,d_m` or
+    /// `lat_deg,lon_deg,height_m`, and optionally `heading_deg` and `scale`.
+    #[key(example = "\"placements.csv\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub placements: Option<PathBuf>,
-    /// Direction of the model's front (+z), degrees east of north. With 180, its x axis is east, as in maps.
-    #[serde(default)]
+    /// Heading of the model's front (+z), east of north. With 180, its x axis is east, as in maps.
+    #[key(unit = "deg", step = 0.1)]
     pub heading_deg: f64,
     /// Scale: metres per unit of the model.
-    #[serde(default = "one")]
+    #[key(default = 1.0, unit = "x", step = 0.01, above = 0.0, hint = "1 is as the file has it")]
     pub scale: f64,
     /// Whether the model's origin is placed on the terrain, whatever its height.
-    #[serde(default)]
     pub on_ground: bool,
-    /// Index of the scene in the file; by default the file's own choice.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Index of the scene in the file. Left out: the file's own choice.
+    #[key(step = 0.1, example = "0")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub scene: Option<u32>,
-    /// Time in the model's animations, seconds; by default nodes keep their static pose. With
-    /// `motion.animate`, the time at path time 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Time in the model's animations; with `motion.animate`, that at path time 0. Left out: nodes keep their
+    /// static pose.
+    #[key(unit = "s", step = 0.01, example = "0.0")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
-    /// Index of the animation; by default all animations together.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Index of the animation in the file. Left out: all animations together.
+    #[key(step = 0.1, example = "0")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub animation: Option<u32>,
-    /// Name of its objects in `objects.csv`; the file's name without ending by default. The k-th row of a
+    /// Name of its objects in `objects.csv`. Left out: the file's name without ending. The k-th row of a
     /// placement table (from 1) gives `name#k`, and each node or material `name/node`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[key(example = "\"house\"")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of its objects, 1 to 65535; left out: 0, none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Class of its objects. Left out: 0, none.
+    #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "3")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
-    /// What an object is.
-    #[serde(default, skip_serializing_if = "ObjectsOf::is_default")]
+    /// What an object is: each copy, or its nodes or materials.
+    #[serde(skip_serializing_if = "ObjectsOf::is_default")]
     pub objects: ObjectsOf,
-    /// Classes, 1 to 65535, of nodes (and all below them) or of materials, by name, in place of `class`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    /// Classes by name of node (with all below it) or of material, in place of `class`.
+    #[key(min = 1, max = u16::MAX, hint = "leave it out for no class", example = "{ roof = 4 }")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub classes: BTreeMap<String, u16>,
-    /// How it moves; by default it stands still.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// How it moves. Left out: it stands still.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSpec>,
 }
 
 /// What an object of a model is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectsOf {
     /// Each placed copy.
@@ -292,12 +376,8 @@ impl ObjectsOf {
     }
 }
 
-fn one() -> f64 {
-    1.0
-}
-
 /// Kinds of calibration boards.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum BoardKind {
     /// Alternating black and white squares.
@@ -313,7 +393,7 @@ pub enum BoardKind {
 }
 
 /// ArUco dictionaries by squares per side; the first 250 markers of OpenCV's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 pub enum Dictionary {
     /// `DICT_4X4_50`, `_100`, `_250`.
     #[default]
@@ -340,7 +420,7 @@ pub enum PatternCentre {
 }
 
 /// Vertical references.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeightReference {
     /// Above the WGS-84 ellipsoid.
@@ -348,8 +428,4 @@ pub enum HeightReference {
     Ellipsoid,
     /// Above mean sea level (EGM96 geoid).
     Msl,
-}
-
-fn sky() -> [f64; 3] {
-    [0.65, 0.85, 1.0]
 }

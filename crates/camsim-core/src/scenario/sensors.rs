@@ -8,10 +8,16 @@ mod per_axis;
 pub use imu::{ImuSpec, SensorCarrier, TriadSpec};
 pub use per_axis::PerAxis;
 
-use super::Scenario;
+use super::{
+    Scenario,
+    keys::{Table, Words},
+};
+
+/// Largest rate of a sensor, hertz.
+const MAX_RATE_HZ: f64 = 100_000.0;
 
 /// Axes of a sensor whose mount has the angles 0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorAxes {
     /// Forward, right, down: those of the body.
@@ -23,168 +29,178 @@ pub enum SensorAxes {
     Rdf,
 }
 
-/// Place and orientation of a sensor in the body frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Place and orientation of a sensor on the platform.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorMountSpec {
-    /// Roll, pitch, yaw (ZYX), as of a camera's mount.
+    /// Roll, pitch, yaw (ZYX) of the sensor on the platform, as of a camera's mount.
+    #[key(unit = "deg", step = 0.1, names = "roll pitch yaw")]
     pub angles_deg: [f64; 3],
-    /// Lever arm in body axes (forward, right, down).
+    /// Lever arm in body axes: forward, right, down.
+    #[key(unit = "m", step = 0.01, names = "fwd right down")]
     pub offset_m: [f64; 3],
 }
 
-/// `[[gnss]]`: a satellite receiver. Sigmas are of north and east each, and of height.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A satellite receiver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct GnssSpec {
-    /// Name of the sensor and its files; part of the seed of its noise.
+    /// Name of the sensor and its files. It is part of the seed of its noise.
+    #[key(required, example = "\"gnss0\"")]
     pub name: String,
     /// Samples per second.
+    #[key(default = 10.0, unit = "Hz", above = 0.0, max = MAX_RATE_HZ, hint = "give samples a second")]
     pub rate_hz: f64,
-    /// Antenna in body axes (forward, right, down).
+    /// Position of the antenna in body axes: forward, right, down.
+    #[key(unit = "m", step = 0.01, names = "fwd right down")]
     pub offset_m: [f64; 3],
-    /// Standard deviation of white noise: horizontal (each axis), vertical.
+    /// Standard deviation of white noise: horizontal (north and east each), vertical.
+    #[key(
+        unit = "m",
+        step = 0.1,
+        min = 0.0,
+        hint = "give [horizontal, vertical]; 0 is none",
+        names = "horizontal vertical"
+    )]
     pub sigma_m: [f64; 2],
-    /// Standard deviation of an error correlated over `drift_tau_s` (first-order Gauss-Markov).
+    /// Standard deviation of a correlated error: horizontal (north and east each), vertical. It is a
+    /// first-order Gauss-Markov process with the correlation time `drift_tau_s`.
+    #[key(
+        unit = "m",
+        step = 0.1,
+        min = 0.0,
+        hint = "give [horizontal, vertical]; 0 is none",
+        names = "horizontal vertical"
+    )]
     pub drift_m: [f64; 2],
     /// Correlation time of that error.
+    #[key(default = 100.0, unit = "s", above = 0.0, hint = "give the correlation time in seconds")]
     pub drift_tau_s: f64,
-    /// Standard deviation of white noise of the velocity.
+    /// Standard deviation of white noise of the velocity: horizontal, vertical. Horizontal is north and east
+    /// each.
+    #[key(
+        unit = "m/s",
+        step = 0.01,
+        min = 0.0,
+        hint = "give [horizontal, vertical]; 0 is none",
+        names = "horizontal vertical"
+    )]
     pub velocity_sigma_m_s: [f64; 2],
-    /// Intervals without a fix, seconds of path time.
+    /// Intervals without a fix: begin and end of each, counted from the first row of the log.
+    #[key(unit = "s", example = "[[12.0, 15.0]]", names = "from to")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub dropouts_s: Vec<[f64; 2]>,
-    /// Mean time from the end of one random dropout to the begin of the next; 0 is none.
+    /// Mean time from the end of one random dropout to the begin of the next. 0 is none.
+    #[key(unit = "s", min = 0.0, hint = "0 is none")]
     pub dropout_every_s: f64,
     /// Mean length of random dropouts.
+    #[key(unit = "s", step = 0.1, min = 0.0, hint = "0 is none")]
     pub dropout_mean_s: f64,
-    /// Time from the instant of a fix until it is available.
+    /// Time from the instant of a fix until it is available (`t_available_ns`).
+    #[key(unit = "ms", min = 0.0, hint = "it is the age of a fix when it arrives")]
     pub delay_ms: f64,
     /// Added to every stamp.
+    #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
+    #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
     pub jitter_ms: f64,
 }
 
-impl Default for GnssSpec {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            rate_hz: 10.0,
-            offset_m: [0.0; 3],
-            sigma_m: [0.0; 2],
-            drift_m: [0.0; 2],
-            drift_tau_s: 100.0,
-            velocity_sigma_m_s: [0.0; 2],
-            dropouts_s: Vec::new(),
-            dropout_every_s: 0.0,
-            dropout_mean_s: 0.0,
-            delay_ms: 0.0,
-            clock_offset_ms: 0.0,
-            jitter_ms: 0.0,
-        }
-    }
-}
-
-/// `[[barometer]]`: static pressure in the standard atmosphere.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A barometer: static pressure in the standard atmosphere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct BarometerSpec {
-    /// Name of the sensor and its files; part of the seed of its noise.
+    /// Name of the sensor and its files. It is part of the seed of its noise.
+    #[key(required, example = "\"baro0\"")]
     pub name: String,
     /// Samples per second.
+    #[key(default = 50.0, unit = "Hz", above = 0.0, max = MAX_RATE_HZ, hint = "give samples a second")]
     pub rate_hz: f64,
-    /// Place in body axes (forward, right, down).
+    /// Place in body axes: forward, right, down.
+    #[key(unit = "m", step = 0.01, names = "fwd right down")]
     pub offset_m: [f64; 3],
     /// Pressure at mean sea level. All pressures are those of the standard atmosphere times this over
     /// 101 325 Pa.
+    #[key(
+        default = 101_325.0,
+        unit = "Pa",
+        step = 10.0,
+        min = 1e3,
+        max = 1e6,
+        hint = "give pascals; 101325 is the standard"
+    )]
     pub sea_level_pa: f64,
     /// Constant error.
+    #[key(unit = "Pa")]
     pub bias_pa: f64,
     /// Standard deviation of white noise.
+    #[key(unit = "Pa", step = 0.1, min = 0.0, hint = "0 is none")]
     pub sigma_pa: f64,
     /// Standard deviation of an error correlated over `drift_tau_s` (first-order Gauss-Markov).
+    #[key(unit = "Pa", min = 0.0, hint = "0 is none")]
     pub drift_pa: f64,
     /// Correlation time of that error.
+    #[key(default = 100.0, unit = "s", above = 0.0, hint = "give the correlation time in seconds")]
     pub drift_tau_s: f64,
-    /// Step of the output; 0 is none.
+    /// Step of the output. 0 is none.
+    #[key(unit = "Pa", step = 0.1, min = 0.0, hint = "0 is none")]
     pub quantisation_pa: f64,
     /// Added to every stamp.
+    #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
+    #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
     pub jitter_ms: f64,
 }
 
-impl Default for BarometerSpec {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            rate_hz: 50.0,
-            offset_m: [0.0; 3],
-            sea_level_pa: 101_325.0,
-            bias_pa: 0.0,
-            sigma_pa: 0.0,
-            drift_pa: 0.0,
-            drift_tau_s: 100.0,
-            quantisation_pa: 0.0,
-            clock_offset_ms: 0.0,
-            jitter_ms: 0.0,
-        }
-    }
-}
-
-/// `[[magnetometer]]`: the Earth's field in sensor axes. One of `field_ned_ut` and `date` is given.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A magnetometer: the Earth's field in sensor axes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct MagnetometerSpec {
-    /// Name of the sensor and its files; part of the seed of its noise.
+    /// Name of the sensor and its files. It is part of the seed of its noise.
+    #[key(required, example = "\"mag0\"")]
     pub name: String,
     /// Samples per second.
+    #[key(default = 50.0, unit = "Hz", above = 0.0, max = MAX_RATE_HZ, hint = "give samples a second")]
     pub rate_hz: f64,
-    /// Place and orientation.
+    /// Place and orientation on the platform.
     pub mount: SensorMountSpec,
-    /// Axes of the output.
+    /// Axes of the output at the mount's angles 0.
     pub axes: SensorAxes,
-    /// The field everywhere: north, east, down, microtesla.
+    /// The Earth's field everywhere: north, east, down. Either this or `date` is given.
+    #[key(unit = "uT", step = 0.1, example = "[21.6, 1.4, 43.1]", names = "N E D")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field_ned_ut: Option<[f64; 3]>,
-    /// `YYYY-MM-DD`: the field of the World Magnetic Model on this day.
+    /// Day (`YYYY-MM-DD`) of the field of the World Magnetic Model, in place of `field_ned_ut`.
+    #[key(example = "\"2026-11-27\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub date: Option<String>,
     /// Constant field of the vehicle, in sensor axes.
+    #[key(unit = "uT", step = 0.1, names = "x y z")]
     pub hard_iron_ut: [f64; 3],
     /// Matrix by which the vehicle's iron distorts the field, row by row, in sensor axes.
+    #[key(
+        default = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        step = 0.01,
+        names = "xx xy xz yx yy yz zx zy zz"
+    )]
     pub soft_iron: [f64; 9],
-    /// Standard deviation of white noise of each axis.
+    /// Standard deviation of white noise: a number, or one of each axis.
+    #[key(unit = "uT", step = 0.01, min = 0.0, hint = "0 is none")]
     pub sigma_ut: PerAxis,
-    /// Step of the output; 0 is none.
+    /// Step of the output. 0 is none.
+    #[key(unit = "uT", step = 0.01, min = 0.0, hint = "0 is none")]
     pub quantisation_ut: f64,
-    /// Largest output of each axis; 0 is no limit.
+    /// Largest output of each axis. 0 is no limit.
+    #[key(unit = "uT", min = 0.0, hint = "0 is no limit")]
     pub range_ut: f64,
     /// Added to every stamp.
+    #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
+    #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
     pub jitter_ms: f64,
-}
-
-impl Default for MagnetometerSpec {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            rate_hz: 50.0,
-            mount: SensorMountSpec::default(),
-            axes: SensorAxes::Frd,
-            field_ned_ut: None,
-            date: None,
-            hard_iron_ut: [0.0; 3],
-            soft_iron: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            sigma_ut: PerAxis::default(),
-            quantisation_ut: 0.0,
-            range_ut: 0.0,
-            clock_offset_ms: 0.0,
-            jitter_ms: 0.0,
-        }
-    }
 }
 
 impl MagnetometerSpec {

@@ -4,26 +4,30 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// `[output.tracks]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+use super::keys::Table;
+
+/// Points whose pixel is written for every frame that sees them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
+#[serde(default, deny_unknown_fields)]
 pub struct TracksSpec {
-    /// Where the points come from.
+    /// Sources of the points. `terrain`, `vertices` (of models), `board`, a CSV table, or a list of these.
+    #[key(required, example = "\"terrain\"")]
     #[serde(deserialize_with = "one_or_several")]
     pub points: Vec<PointSource>,
-    /// Most points of each of `terrain`, `vertices` and `board`, at most [`TracksSpec::MOST_POINTS`]. All
-    /// points of a table are tracked.
-    #[serde(default = "usual_count")]
+    /// Most points of each of `terrain`, `vertices` and `board`. All points of a table are tracked.
+    #[key(
+        default = 1000,
+        step = 10.0,
+        min = 1,
+        max = TracksSpec::MOST_POINTS,
+        hint = "it counts the points of each source; 1000 is the default"
+    )]
     pub count: u32,
 }
 
 impl TracksSpec {
     /// Largest value of `count`.
     pub const MOST_POINTS: u32 = 1_000_000;
-}
-
-fn usual_count() -> u32 {
-    1000
 }
 
 /// A source of points.

@@ -8,55 +8,73 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Channel, FieldOr, FlowInstant, ImageSensorSpec, LensSpec, PlaneKind, Reset, Scenario, ShutterSpec,
+    keys::{Table, Words},
 };
 use crate::shutter::{Shutter, ShutterError};
 
 /// Largest number of pictures of a burst.
 pub const MAX_INSTANTS: u32 = 1000;
 
-/// `[[output.twin]]`: what is left out of a twin. Keys that are not given are as in the frame.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// A better camera, by what is left out of it. Keys that are not given are as in the frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct TwinSpec {
     /// Name of the twin's folder, below that of the frames.
+    #[key(required, example = "\"sharp\"")]
     pub name: String,
-    /// `false`: an instant in place of the exposure, hence without motion blur.
+    /// Exposure. `false`: an instant in its place, hence no motion blur.
+    #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<bool>,
-    /// All pixels at one instant.
+    /// Shutter. `global`: all pixels at one instant.
+    #[key(example = "\"global\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shutter: Option<TwinShutter>,
-    /// That instant: mid-exposure of the first row, of the image's centre (default) or of the last row.
+    /// Instant of a global shutter. Left out: mid-exposure of the image's centre.
+    #[key(example = "\"centre\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instant: Option<FlowInstant>,
-    /// `false`: a pinhole with the same focal length, principal point and size.
+    /// Lens. `false`: a pinhole with the same focal length, principal point and size.
+    #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens: Option<bool>,
-    /// `false`: no noise.
+    /// Noise. `false`: none.
+    #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<bool>,
-    /// `false`: no vignette.
+    /// Vignette. `false`: none.
+    #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignette: Option<bool>,
-    /// No exposure, rolling shutter, lens, noise, vignette or point spread.
+    /// Neither exposure, rolling shutter, lens, noise, vignette nor point spread.
     #[serde(skip_serializing_if = "is_false")]
     pub ideal: bool,
-    /// A burst of this many pictures without exposure, at most [`MAX_INSTANTS`].
+    /// Pictures in a burst for each frame, each without exposure. Left out: one picture of each frame.
+    #[key(
+        step = 0.1,
+        min = 1,
+        max = MAX_INSTANTS,
+        hint = "leave it out for one picture of each frame",
+        example = "9"
+    )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instants: Option<u32>,
-    /// What the instants of a burst are spread over; the exposure by default.
+    /// What the instants of a burst are spread over. Left out: the exposure.
+    #[key(example = "\"exposure\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub over: Option<BurstOver>,
-    /// Channels of the twin; those of the frame by default.
+    /// Channels of the twin. Left out: those of the frame.
+    #[key(example = "[\"color\"]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<Channel>>,
-    /// `false`: no point spread and no glare.
+    /// Point spread. `false`: none, and no glare.
+    #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_spread: Option<bool>,
 }
 
 /// Shutters of a twin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum TwinShutter {
     /// All pixels at one instant: no readout, no interlacing.
@@ -64,7 +82,7 @@ pub enum TwinShutter {
 }
 
 /// What the instants of a burst are spread over.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum BurstOver {
     /// The exposure of each row: instant k of N is `((k + 0.5)/N - 0.5) t_e` after the mid-exposure. The mean

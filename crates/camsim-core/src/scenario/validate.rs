@@ -4,9 +4,9 @@ use std::fmt;
 
 use super::{
     Auto, Axis, CameraSpec, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, Stamps,
-    TrackerSpec,
+    keys::{Table, join, violations},
 };
-use crate::temporal::{MAX_KEYS, SAMPLES};
+use crate::temporal::SAMPLES;
 
 mod auto_exposure;
 mod image_sensor;
@@ -40,9 +40,6 @@ pub const MAX_FOOTPRINT_TAPS: u32 = 64;
 /// Largest number of output frames per ideal frame.
 pub const MAX_FRAMES_PER_IDEAL: u32 = 64;
 
-/// Largest offset of a camera's clock, 127 years: stamps of this century stay within 64 bits.
-const MAX_CLOCK_OFFSET_MS: f64 = 4e12;
-
 /// An invalid value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
@@ -61,9 +58,8 @@ impl fmt::Display for Problem {
 /// All values of `scenario` that are out of range, in the order of the file; empty if the scenario can be
 /// run.
 pub fn validate(scenario: &Scenario) -> Vec<Problem> {
-    let mut check = Check::default();
+    let mut check = Check::of_intervals(scenario, "");
     check_flight(&mut check, scenario);
-    check_tracker(&mut check, &scenario.tracker);
     check_camera(&mut check, &scenario.camera);
     scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
@@ -80,7 +76,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
 
 /// As [`validate`], for a camera alone; keys begin with `camera.`.
 pub fn validate_camera(camera: &CameraSpec) -> Vec<Problem> {
-    let mut check = Check::default();
+    let mut check = Check::of_intervals(camera, "camera");
     check_camera(&mut check, camera);
     check.problems
 }
@@ -88,41 +84,30 @@ pub fn validate_camera(camera: &CameraSpec) -> Vec<Problem> {
 #[derive(Default)]
 struct Check {
     problems: Vec<Problem>,
+    /// How many of the problems are numbers outside of their intervals: they come first.
+    intervals: usize,
 }
 
 impl Check {
+    /// The numbers of a table that are outside of their legal intervals.
+    fn of_intervals(table: &dyn Table, prefix: &str) -> Self {
+        let problem = |(key, message): (String, String)| Problem { key: join(prefix, &key), message };
+        let problems: Vec<Problem> = violations(table).into_iter().map(problem).collect();
+        Self { intervals: problems.len(), problems }
+    }
+
+    /// Adds a problem of a key; a number outside of its interval is told once.
     fn fail(&mut self, key: impl Into<String>, message: impl Into<String>) {
-        self.problems.push(Problem { key: key.into(), message: message.into() });
+        let key = key.into();
+        if self.problems[..self.intervals].iter().all(|problem| problem.key != key) {
+            self.problems.push(Problem { key, message: message.into() });
+        }
     }
 
     fn require(&mut self, ok: bool, key: impl Into<String>, message: impl FnOnce() -> String) {
         if !ok {
             self.fail(key, message());
         }
-    }
-
-    fn positive(&mut self, key: impl Into<String>, value: f64, fix: &str) {
-        self.require(value.is_finite() && value > 0.0, key, || {
-            format!("must be a finite number above 0, not {value}; {fix}")
-        });
-    }
-
-    fn not_negative(&mut self, key: impl Into<String>, value: f64, fix: &str) {
-        self.require(value.is_finite() && value >= 0.0, key, || {
-            format!("must be a finite number, 0 or more, not {value}; {fix}")
-        });
-    }
-
-    fn finite(&mut self, key: impl Into<String>, values: &[f64]) {
-        self.require(values.iter().all(|value| value.is_finite()), key, || {
-            format!("must be finite, not {values:?}")
-        });
-    }
-
-    fn count(&mut self, key: &str, value: Auto<u32>, most: u32) {
-        self.require(value.value().is_none_or(|count| (1..=most).contains(&count)), key, || {
-            format!("must be 1 to {most}; leave it out or write \"auto\" for the planner's choice")
-        });
     }
 }
 
@@ -138,7 +123,6 @@ fn check_flight(check: &mut Check, scenario: &Scenario) {
             )
         });
     }
-    check.positive("flight.speed", flight.speed, "1 flies the log in its own time, 2 twice as fast");
     if let Origin::Geodetic([lat_deg, lon_deg, height_m]) = flight.origin {
         let ok = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 360.0 && height_m.is_finite();
         check.require(ok, "flight.origin", || {
@@ -147,51 +131,12 @@ fn check_flight(check: &mut Check, scenario: &Scenario) {
     }
 }
 
-fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
-    check.require(tracker.rate_hz >= 1.0 && tracker.rate_hz <= 100_000.0, "tracker.rate_hz", || {
-        format!("must lie in 1..100000, not {}; 400 is the default", tracker.rate_hz)
-    });
-    for (key, limit) in [
-        ("tracker.max_speed_m_s", tracker.max_speed_m_s),
-        ("tracker.max_acceleration_m_s2", tracker.max_acceleration_m_s2),
-        ("tracker.max_angular_rate_deg_s", tracker.max_angular_rate_deg_s),
-        ("tracker.max_angular_acceleration_deg_s2", tracker.max_angular_acceleration_deg_s2),
-    ] {
-        if let Auto::Value(limit) = limit {
-            check.positive(key, limit, "or write \"auto\"");
-        }
-    }
-}
-
 /// Largest side of an image; larger ones are typing errors on every adapter.
 pub const MAX_SIDE_PX: u32 = crate::camera::MAX_SIZE_PX;
 
 fn check_camera(check: &mut Check, camera: &CameraSpec) {
-    check.require(
-        camera.size_px.iter().all(|&side| (1..=MAX_SIDE_PX).contains(&side)),
-        "camera.size_px",
-        || format!("must be [width, height], each 1..{MAX_SIDE_PX}, not {:?}", camera.size_px),
-    );
-    check_focal(check, "camera.focal_px", camera.focal_px);
-    check.finite("camera.principal_point_px", &camera.principal_point_px.unwrap_or_default());
-    check.positive("camera.fps", camera.fps, "give frames per second, for example 30");
-    check.finite("camera.phase", &[camera.phase]);
-    check.require(camera.clock_offset_ms.abs() <= MAX_CLOCK_OFFSET_MS, "camera.clock_offset_ms", || {
-        format!(
-            "must lie within {MAX_CLOCK_OFFSET_MS:e} milliseconds of 0, not {}; it is how much the camera's clock \
-             is ahead",
-            camera.clock_offset_ms
-        )
-    });
-
-    check.finite("camera.mount.angles_deg", &camera.mount.angles_deg);
-    check.finite("camera.mount.offset_m", &camera.mount.offset_m);
     for (i, vibration) in camera.mount.vibration.iter().enumerate() {
         let key = |name: &str| format!("camera.mount.vibration.{i}.{name}");
-        check.finite(key("amplitude_deg"), &[vibration.amplitude_deg]);
-        check.finite(key("amplitude_m"), &[vibration.amplitude_m]);
-        check.not_negative(key("hz"), vibration.hz, "give the frequency in hertz");
-        check.finite(key("phase_deg"), &[vibration.phase_deg]);
         let rotation = matches!(vibration.axis, Axis::Roll | Axis::Pitch | Axis::Yaw);
         check.require(!rotation || vibration.amplitude_m.abs() == 0.0, key("amplitude_m"), || {
             "is for translation axes; use amplitude_deg".into()
@@ -217,12 +162,6 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
         "cannot be combined with camera.lens.model = \"table\", which holds for one focal length".into()
     });
     for (i, zoom) in camera.zoom.iter().enumerate() {
-        check.finite(format!("camera.zoom.{i}.at"), &[zoom.at]);
-        check_focal(check, &format!("camera.zoom.{i}.focal_px"), zoom.focal_px);
-        check.finite(
-            format!("camera.zoom.{i}.principal_point_px"),
-            &zoom.principal_point_px.unwrap_or_default(),
-        );
         check_coefficients(
             check,
             &format!("camera.zoom.{i}.coefficients"),
@@ -246,15 +185,10 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     timing::check_shutter(check, camera);
     timing::check_timing(check, camera);
 
-    let photometric = &camera.photometric;
-    let [t1, t2] = photometric.vignette_thresholds;
-    check.require(
-        t1.is_finite() && t2.is_finite() && t1 >= 0.0 && t2 > 0.0,
-        "camera.photometric.vignette_thresholds",
-        || format!("must be [t1 >= 0, t2 > 0], not [{t1}, {t2}]; [0.05, 0.5] is the default"),
-    );
-    check.not_negative("camera.photometric.light", photometric.light, "1 leaves the light as it is");
-    check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
+    let [_, t2] = camera.photometric.vignette_thresholds;
+    check.require(t2 != 0.0, "camera.photometric.vignette_thresholds", || {
+        "must have a second number above 0, which the map is divided by; [0.05, 0.5] is the default".into()
+    });
     image_sensor::check_image_sensor(check, camera);
     auto_exposure::check_auto_exposure(check, camera);
     point_spread::check_point_spread(check, camera);
@@ -262,29 +196,17 @@ fn check_camera(check: &mut Check, camera: &CameraSpec) {
     resized::check_resized(check, camera);
 }
 
-fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
-    check.require(focal_px.iter().all(|&f| f.is_finite() && f > 0.0), key, || {
-        format!("must be [fx, fy], both finite and above 0, not {focal_px:?}; a 60 degree lens on 640 px has about 554")
-    });
-}
-
 fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     let quality = &scenario.quality;
     if quality.preset == Preset::Paper {
         check_paper(check, scenario);
     }
-    check.positive("quality.max_error_px", quality.max_error_px, "0.05 is the default");
-    check.positive("quality.max_error_dn", quality.max_error_dn, "1 is the default");
-    check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
-    check.count("quality.iterations", quality.iterations, MAX_ITERATIONS);
     check.require(
         quality.iterations == Auto::Auto
             || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle)),
         "quality.iterations",
         || "counts the depth look-ups of \"reproject\"; leave it out with any other quality.solver".into(),
     );
-    check.count("quality.blur_samples", quality.blur_samples, MAX_BLUR_SAMPLES);
-    check.count("quality.footprint_taps", quality.footprint_taps, MAX_FOOTPRINT_TAPS);
     check.require(
         quality.ideal_samples.value().is_none_or(|samples| [1, SAMPLES].contains(&samples)),
         "quality.ideal_samples",
@@ -295,31 +217,8 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
         "quality.ideal_samples",
         || "excludes silhouette rays (quality.silhouettes = \"rays\"); leave one of them out".into(),
     );
-    check.require(
-        quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)),
-        "quality.ideal_scale",
-        || "must be 1 to 5 ideal pixels per camera pixel, or \"auto\"".into(),
-    );
-    check.require(
-        (1..=MAX_FRAMES_PER_IDEAL).contains(&quality.frames_per_ideal),
-        "quality.frames_per_ideal",
-        || {
-            format!(
-                "must be 1 (each frame its own) to {MAX_FRAMES_PER_IDEAL}, not {}; 8 is the default",
-                quality.frames_per_ideal
-            )
-        },
-    );
-    check.require(
-        quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)),
-        "quality.key_frames",
-        || format!("must be 1 to {MAX_KEYS} ideal frames for each output frame, or \"auto\""),
-    );
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
-    });
-    check.require(scenario.output.flow_step >= 1, "output.flow_step", || {
-        "must be at least 1: flow leads from frame i to frame i + flow_step".into()
     });
     check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
         "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()

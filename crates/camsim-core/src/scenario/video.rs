@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::keys::{Table, Words};
+
 /// File formats of colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum ImageFormat {
     /// OpenEXR, linear, unquantised.
@@ -12,7 +14,7 @@ pub enum ImageFormat {
     Png,
     /// A video of all frames, encoded by ffmpeg.
     Mp4,
-    /// As [`ImageFormat::Mp4`], in a Matroska file.
+    /// As `mp4`, in a Matroska file.
     Mkv,
     /// An uncompressed video (YUV4MPEG2).
     Y4m,
@@ -42,7 +44,7 @@ impl ImageFormat {
 }
 
 /// File formats of raw pictures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawFormat {
     /// PNG of 16 bits.
@@ -71,15 +73,17 @@ impl RawFormat {
     }
 }
 
-/// `[output.video]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Encoding of videos.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct VideoSpec {
     /// Encoder of `mp4` and `mkv`.
     pub codec: VideoCodec,
     /// Bits of each code value, 8 or 10.
+    #[key(default = 8, step = 0.1, min = 8, max = 10, hint = "give 8 or 10")]
     pub bits: u32,
-    /// Constant rate factor of H.264 and H.265: 0 is best, [`VideoSpec::WORST_CRF`] smallest.
+    /// Constant rate factor of H.264 and H.265: 0 is best, 51 smallest.
+    #[key(default = 18, step = 0.1, min = 0, max = VideoSpec::WORST_CRF, hint = "18 is the default")]
     pub crf: u32,
 }
 
@@ -92,14 +96,8 @@ impl VideoSpec {
     }
 }
 
-impl Default for VideoSpec {
-    fn default() -> Self {
-        Self { codec: VideoCodec::H264, bits: 8, crf: 18 }
-    }
-}
-
 /// Encoders of videos.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum VideoCodec {
     /// H.264 by x264.

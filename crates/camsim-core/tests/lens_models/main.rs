@@ -182,7 +182,7 @@ fn lens_map_times() {
     };
     let k = [-0.283, 0.074, 2e-4, 2e-5];
     let sets = golden_sets();
-    for model in LensModel::ALL {
+    for &model in LensModel::ALL {
         let Some(set) = sets.iter().find(|set| set.camera.lens.model() == model) else { continue };
         let mut plain = set.camera.clone();
         plain.lens = Lens::new(LensModel::BrownConrady, &k).unwrap();

@@ -9,7 +9,7 @@ pub struct Set {
 }
 
 fn model_by_name(name: &str) -> LensModel {
-    *LensModel::ALL.iter().find(|model| model.facts().name == name).unwrap()
+    LensModel::named(name).unwrap()
 }
 
 pub fn golden_sets() -> Vec<Set> {

@@ -61,7 +61,7 @@ fn lens_models_agree_with_their_twins() {
     let plans = plans(run(Group::Planned, &planned_cases::lenses()));
     let models: HashSet<LensModel> = plans.iter().map(|plan| plan.camera.lens.model()).collect();
     let others = [LensModel::Pinhole, LensModel::BrownConrady, LensModel::KannalaBrandt, LensModel::Table];
-    assert_all(&models, LensModel::ALL.into_iter().filter(|model| !others.contains(model)));
+    assert_all(&models, LensModel::ALL.iter().copied().filter(|model| !others.contains(model)));
 }
 
 #[test]

@@ -188,7 +188,7 @@ fn moved_folders_and_inputs_can_be_resumed() {
 
 #[test]
 fn all_paths_of_a_scenario_are_made_relative() {
-    use crate::scenario_file::{ValueKind, keys};
+    use crate::scenario_file::{ValueKind, kinds};
     use camsim_core::lens::LensTable;
     let text = r#"
             flight = { log = "x/1" }
@@ -213,7 +213,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
     let mut tree = serde_json::to_value(&scenario).unwrap();
     let mut visited = Vec::new();
     for_each_path(&mut tree, &mut |key, _| visited.push(key.replace(".0.", ".").replace(".1.", ".")));
-    for (key, _) in keys().iter().filter(|(_, kind)| matches!(kind, ValueKind::Path | ValueKind::Paths)) {
+    for (key, _) in kinds().filter(|(_, kind)| matches!(kind, ValueKind::Path | ValueKind::Paths)) {
         assert!(visited.iter().any(|visited| visited == key), "{key}");
     }
     assert!(visited.contains(&"output.tracks.points.1".to_owned()), "{visited:?}");

@@ -89,8 +89,8 @@ fn check_table(
         };
         problems.extend(problem.map(|message| (indexed_key, message)));
     }
-    for (required, parent) in schema.required {
-        let path = required.strip_prefix(parent).unwrap_or(required).trim_start_matches('.');
+    for (required, parent) in &schema.required {
+        let path = required.strip_prefix(parent.as_str()).unwrap_or(required).trim_start_matches('.');
         if *parent == schema::like_camera(key) && !has(table, path) {
             problems.push((join(indexed_key, path), "is missing, and has no default; add it".into()));
         }
@@ -191,6 +191,7 @@ fn type_problem(key: &str, kind: ValueKind, value: &Value) -> Option<String> {
         ValueKind::Paths => (false, "a path in quotes or a list of these".to_owned()),
         ValueKind::Text => (value.is_str(), "a text in quotes".to_owned()),
         ValueKind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),
+        ValueKind::Table => (value.is_table(), "a table".to_owned()),
         ValueKind::Tables => (false, format!("a list of tables; write [[{key}]]")),
         ValueKind::Word(words) => (among(value, words), format!("one of {}", list(words))),
         ValueKind::Words(words) => {

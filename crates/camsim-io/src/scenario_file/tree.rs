@@ -14,7 +14,7 @@ use toml::{
 use super::{
     ScenarioError,
     escapes::{backslash_advice, with_slashes},
-    schema::{CAMERAS, KEYS},
+    schema::{CAMERAS, keys},
     wrong_file_kind::wrong_kind_message,
 };
 
@@ -112,7 +112,7 @@ impl Tree {
     /// their key. A scenario, or `[camera]` copied with its header, is refused.
     pub(crate) fn read_camera(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
         let tree = Self::read(path, prefix)?;
-        let mut scenario_keys = KEYS.iter().filter_map(|(key, _)| key.split('.').next()).chain([CAMERAS]);
+        let mut scenario_keys = keys().iter().filter_map(|key| key.name.split('.').next()).chain([CAMERAS]);
         match scenario_keys.find(|name| tree.root.contains_key(*name)) {
             None => Ok(tree),
             Some(name) => {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::schema::KEYS;
+use super::schema::keys;
 
 /// Substrings that only calibration files have.
 const CALIBRATION_MARKS: [&str; 7] = [
@@ -136,8 +136,8 @@ fn toml_kind(root: &toml::Table) -> Option<TomlKind> {
         return Some(TomlKind::Frame);
     }
     let is_camera_key = |key: &String| {
-        KEYS.iter().any(|(known, _)| {
-            known.strip_prefix("camera.").is_some_and(|rest| rest.split('.').next() == Some(key))
+        keys().iter().any(|known| {
+            known.name.strip_prefix("camera.").is_some_and(|rest| rest.split('.').next() == Some(key))
         })
     };
     (!root.is_empty() && root.keys().all(is_camera_key)).then_some(TomlKind::Camera)

@@ -57,7 +57,7 @@ pub fn channel_pictures(frame: &RenderedFrame) -> Vec<(Channel, RenderedFrame)> 
         let pixel = |[r, g, b]: [u8; 3]| [linear[r as usize], linear[g as usize], linear[b as usize], 1.0];
         Some((channel, with_color(frame, rgb8.into_iter().flat_map(pixel).collect())))
     };
-    Channel::ALL.into_iter().filter_map(picture).collect()
+    Channel::ALL.iter().copied().filter_map(picture).collect()
 }
 
 fn with_color(frame: &RenderedFrame, color_rgba: Vec<f32>) -> RenderedFrame {

@@ -17,7 +17,7 @@ pub struct NumberField<'a> {
     pub label: &'a str,
     /// Unit of the number.
     pub unit: &'a str,
-    /// Least and largest value.
+    /// Least and largest value; infinite without a limit.
     pub range: [f64; 2],
     /// Change per point of drag.
     pub speed: f64,
@@ -72,10 +72,15 @@ fn rejection(
     [value, changed, accepted]: [f64; 3],
 ) -> Option<String> {
     let unit = if field.unit.is_empty() { String::new() } else { format!(" {}", field.unit) };
-    let range = format!("{low} to {high}{unit}");
+    let range = match [low, high].map(f64::is_finite) {
+        [true, true] => format!("{low} to {high}{unit}"),
+        [true, false] => format!("{low}{unit} or more"),
+        [false, true] => format!("{high}{unit} or less"),
+        [false, false] => "any finite number".to_owned(),
+    };
     let entered = typed.number.get().unwrap_or(changed);
     if !(low..=high).contains(&entered) {
-        return Some(format!("{entered} is not within {range}: {accepted} is used"));
+        return Some(format!("{entered} is not within its range, {range}: {accepted} is used"));
     }
     if field.whole && !response.dragged() && entered.fract() != 0.0 && entered != value {
         return Some(format!("{entered} is not an integer ({range}): {accepted} is used"));

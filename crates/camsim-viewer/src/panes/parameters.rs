@@ -6,6 +6,7 @@ mod presets;
 
 use std::sync::LazyLock;
 
+use camsim_core::scenario::keys::Key;
 use camsim_io::scenario_file::{ValueKind, keys};
 use eframe::egui::{self, RichText, Role, Ui};
 
@@ -16,7 +17,6 @@ use super::{
 use crate::{
     document::Document,
     message::{Message, Outbox},
-    params::{self, Param},
     state::State,
 };
 
@@ -39,11 +39,11 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn groups() -> &'static [Group] {
     static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
         let mut groups: Vec<Group> = Vec::new();
-        for (key, kind) in keys().iter().filter(|(key, _)| !is_element(key)) {
-            let name = key.rsplit_once('.').map_or("", |(group, _)| group);
+        for key in keys().iter().filter(|key| !is_element(&key.name)) {
+            let name = key.name.rsplit_once('.').map_or("", |(group, _)| group);
             match groups.iter_mut().find(|group| group.name == name) {
-                Some(group) => group.keys.push((*key, *kind)),
-                None => groups.push(Group { name, keys: vec![(*key, *kind)] }),
+                Some(group) => group.keys.push(key),
+                None => groups.push(Group { name, keys: vec![key] }),
             }
         }
         groups
@@ -59,15 +59,16 @@ pub fn section_names() -> Vec<&'static str> {
 
 /// Whether a key belongs to elements of a list of tables.
 fn is_element(key: &str) -> bool {
-    keys().iter().any(|(list, kind)| {
-        *kind == ValueKind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.'))
+    keys().iter().any(|list| {
+        list.field.kind == ValueKind::Tables
+            && key.strip_prefix(&list.name).is_some_and(|rest| rest.starts_with('.'))
     })
 }
 
 /// A table of the format with its keys.
 struct Group {
     name: &'static str,
-    keys: Vec<(&'static str, ValueKind)>,
+    keys: Vec<&'static Key>,
 }
 
 impl Group {
@@ -78,8 +79,8 @@ impl Group {
 
 /// Draws the section of a table.
 fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: &mut Outbox) {
-    let changed = group.keys.iter().any(|(key, _)| document.is_changed(key));
-    let wrong = group.keys.iter().any(|(key, _)| document.problem(key).is_some());
+    let changed = group.keys.iter().any(|key| document.is_changed(&key.name));
+    let wrong = group.keys.iter().any(|key| document.problem(&key.name).is_some());
     let mut title = RichText::new(group.title()).strong();
     if wrong {
         title = title.color(ui.visuals().error_fg_color);
@@ -88,8 +89,8 @@ fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: 
     }
     let open = matches!(group.name, "camera.lens" | "camera.shutter" | "camera.photometric");
     egui::CollapsingHeader::new(title).id_salt(group.name).default_open(open).show(ui, |ui| {
-        for (key, kind) in &group.keys {
-            show_key(ui, state, document, key, *kind, out);
+        for key in &group.keys {
+            show_key(ui, state, document, key, out);
         }
     });
 }
@@ -97,34 +98,21 @@ fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: 
 /// Draws the keys of a table on another page.
 pub fn rows(ui: &mut Ui, state: &State, name: &str, out: &mut Outbox) {
     let Some(document) = &state.document else { return };
-    for (key, kind) in groups().iter().filter(|group| group.name == name).flat_map(|group| &group.keys) {
-        show_key(ui, state, document, key, *kind, out);
+    for key in groups().iter().filter(|group| group.name == name).flat_map(|group| &group.keys) {
+        show_key(ui, state, document, key, out);
     }
 }
 
-fn show_key(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: ValueKind, out: &mut Outbox) {
-    match kind {
-        ValueKind::Tables => lists::show(ui, state, document, key, out),
-        kind => row(ui, state, document, key, kind, out),
+fn show_key(ui: &mut Ui, state: &State, document: &Document, key: &'static Key, out: &mut Outbox) {
+    match key.field.kind {
+        ValueKind::Tables => lists::show(ui, state, document, &key.name, out),
+        _ => row(ui, state, document, &key.name, key, out),
     }
 }
 
-/// Draws a key with its editor and unit, and a reset button if it was changed.
-fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: ValueKind, out: &mut Outbox) {
-    let Some(param) = params::find(key) else { return };
-    row_with_param(ui, state, document, key, kind, param, out);
-}
-
-/// Draws a key whose description is given: that of a list element is found under its key without index.
-fn row_with_param(
-    ui: &mut Ui,
-    state: &State,
-    document: &Document,
-    key: &str,
-    kind: ValueKind,
-    param: &Param,
-    out: &mut Outbox,
-) {
+/// Draws a key with its editor and unit, and a reset button if it was changed. The facts of an element of a list
+/// are those of its key without index.
+fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, facts: &Key, out: &mut Outbox) {
     let leaf = key.rsplit('.').next().unwrap_or(key);
     let changed = document.is_changed(key);
     let problem = document.problem(key);
@@ -135,10 +123,10 @@ fn row_with_param(
         text = text.color(ui.visuals().hyperlink_color).strong();
     }
     ui.horizontal_wrapped(|ui| {
-        ui.label(text).with_tooltip(format!("{key}: {}", param.tip));
-        editors::show(ui, document, key, kind, param, out);
-        if !param.unit.is_empty() {
-            ui.weak(param.unit);
+        ui.label(text).with_tooltip(format!("{key}: {}", facts.field.about));
+        editors::show(ui, document, key, facts, out);
+        if !facts.unit.is_empty() {
+            ui.weak(&*facts.unit);
         }
         if changed {
             let name = format!("reset {key}");

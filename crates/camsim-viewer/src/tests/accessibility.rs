@@ -1,6 +1,6 @@
 //! Accessible names: every control of every pane has one.
 
-use camsim_io::scenario_file::{ValueKind, keys};
+use camsim_io::scenario_file::{ValueKind, kinds};
 use egui_kittest::kittest::{NodeT, Queryable};
 
 use super::harness::{Window, has, pattern};
@@ -104,9 +104,8 @@ fn every_key_of_the_format_has_an_editor_with_its_name() {
     (0..40).for_each(|_| window.step());
     window.harness.check_accessibility();
     let elements = |key: &str| {
-        let list = keys()
-            .iter()
-            .find(|(list, kind)| *kind == ValueKind::Tables && key.starts_with(&format!("{list}.")));
+        let list =
+            kinds().find(|&(list, kind)| kind == ValueKind::Tables && key.starts_with(&format!("{list}.")));
         list.map_or_else(|| key.to_owned(), |(list, _)| key.replacen(list, &format!("{list}.0"), 1))
     };
     let labels: Vec<String> = window
@@ -116,7 +115,7 @@ fn every_key_of_the_format_has_an_editor_with_its_name() {
         .filter_map(|node| node.accesskit_node().label().map(|label| label.to_string()))
         .collect();
     let mut without = Vec::new();
-    for (key, kind) in keys().iter().filter(|(_, kind)| *kind != ValueKind::Tables) {
+    for (key, kind) in kinds().filter(|&(_, kind)| kind != ValueKind::Tables) {
         let named = elements(key);
         // A number, an element, a word beside it, or the button that sets the key.
         let is_of_key = |label: &String| {
@@ -125,7 +124,7 @@ fn every_key_of_the_format_has_an_editor_with_its_name() {
                 || *label == format!("one more of {named}")
         };
         if !labels.iter().any(is_of_key) {
-            without.push((named, *kind));
+            without.push((named, kind));
         }
     }
     // The scene has no models.

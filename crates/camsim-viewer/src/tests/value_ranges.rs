@@ -37,16 +37,16 @@ fn exposure_ms(window: &Window) -> f64 {
 fn out_of_range_input_is_reported_with_key_and_range_until_the_next_edit() {
     let mut window = Window::open(Some(pattern()));
     window.settle();
-    let text = "5000 is not within 0 to 1000 ms: 1000 is used";
+    let text = "-5 is not within its range, 0 ms or more: 0 is used";
     let expected = format!("{EXPOSURE}: {text}");
     for typed in [true, false] {
         if typed {
-            type_into(&mut window, EXPOSURE, "5000");
+            type_into(&mut window, EXPOSURE, "-5");
         } else {
-            window.harness.get_by_label(EXPOSURE).set_value_accesskit(5000.0);
+            window.harness.get_by_label(EXPOSURE).set_value_accesskit(-5.0);
             (0..3).for_each(|_| window.step());
         }
-        assert_eq!(exposure_ms(&window), 1000.0, "typed: {typed}");
+        assert_eq!(exposure_ms(&window), 0.0, "typed: {typed}");
         assert!(has(&window, &expected), "in the menu line, typed: {typed}");
         assert!(has(&window, text), "at the field, typed: {typed}");
         send(&mut window, Message::Set("camera.photometric.light".into(), Some(Value::Float(0.9)), false));
@@ -55,14 +55,15 @@ fn out_of_range_input_is_reported_with_key_and_range_until_the_next_edit() {
         send(&mut window, Message::Undo);
         send(&mut window, Message::Undo);
         window.step();
-        assert!(exposure_ms(&window) < 1000.0);
+        assert!(exposure_ms(&window) > 0.0);
     }
     // A legal value gives no message.
     type_into(&mut window, EXPOSURE, "12.5");
     assert_eq!((exposure_ms(&window), &window.state().rejected_input), (12.5, &None));
     // Elements of a list are named by index.
-    type_into(&mut window, "camera.lens.coefficients[0]", "-77");
-    let expected = "camera.lens.coefficients[0]: -77 is not within -10 to 10: -10 is used";
+    type_into(&mut window, "camera.photometric.vignette_thresholds[0]", "-77");
+    let expected =
+        "camera.photometric.vignette_thresholds[0]: -77 is not within its range, 0 or more: 0 is used";
     assert!(has(&window, expected), "{:?}", window.state().rejected_input);
 }
 
@@ -78,15 +79,15 @@ fn a_drag_beyond_the_range_is_reported() {
     window.step();
     press(&mut window, from, true);
     for step in 1..30_u8 {
-        window.harness.event(Event::PointerMoved(from + vec2(60.0 * f32::from(step), 0.0)));
+        window.harness.event(Event::PointerMoved(from - vec2(60.0 * f32::from(step), 0.0)));
         window.step();
     }
-    press(&mut window, from + vec2(1740.0, 0.0), false);
+    press(&mut window, from - vec2(1740.0, 0.0), false);
     window.step();
     let document = window.state().document.as_ref().expect("open");
-    assert_eq!(document.scenario.camera.photometric.noise_sigma, 1.0);
+    assert_eq!(document.scenario.camera.photometric.noise_sigma, 0.0);
     assert!(
-        has(&window, &format!("{name}: at the end of its range, 0 to 1")),
+        has(&window, &format!("{name}: at the end of its range, 0 or more")),
         "{:?}",
         window.state().rejected_input
     );
@@ -94,7 +95,7 @@ fn a_drag_beyond_the_range_is_reported() {
     window.step();
     assert!(
         window.state().rejected_input.is_none()
-            && window.state().document.as_ref().expect("open").scenario.camera.photometric.noise_sigma < 1.0
+            && window.state().document.as_ref().expect("open").scenario.camera.photometric.noise_sigma > 0.0
     );
 }
 
@@ -107,7 +108,7 @@ fn text_that_is_no_number_is_reported_and_changes_nothing() {
     for text in ["abc", "nan", "1,5"] {
         type_into(&mut window, EXPOSURE, text);
         assert_eq!(exposure_ms(&window), before, "{text}");
-        let expected = format!("{EXPOSURE}: \"{text}\" is not a number: {before} is kept (0 to 1000 ms)");
+        let expected = format!("{EXPOSURE}: \"{text}\" is not a number: {before} is kept (0 ms or more)");
         assert!(has(&window, &expected), "{text}: {:?}", window.state().rejected_input);
     }
 }
@@ -128,14 +129,6 @@ fn a_field_that_is_opened_and_left_keeps_all_digits() {
         let now = window.state().document.as_ref().expect("open").scenario.camera.lens.coefficients[0];
         assert_eq!((now, &window.state().rejected_input), (k1, &None), "{leave:?}");
     }
-    // An out-of-range value of a file is kept, too.
-    send(&mut window, Message::Set("camera.photometric.light".into(), Some(Value::Float(250.0)), false));
-    window.step();
-    window.click("camera.photometric.light");
-    window.harness.key_press(Key::Enter);
-    (0..3).for_each(|_| window.step());
-    assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.photometric.light, 250.0);
-    assert_eq!(window.state().rejected_input, None);
 }
 
 #[test]

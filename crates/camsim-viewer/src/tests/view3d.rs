@@ -95,7 +95,7 @@ fn the_view_rotates_pans_and_zooms_by_mouse_and_controls() {
     (0..3).for_each(|_| window.step());
     assert_eq!(orbit(&window).depression_deg, 90.0);
     assert!(
-        has(&window, "view depression: 200 is not within -30 to 90 deg: 90 is used"),
+        has(&window, "view depression: 200 is not within its range, -30 to 90 deg: 90 is used"),
         "{:?}",
         window.state().rejected_input
     );

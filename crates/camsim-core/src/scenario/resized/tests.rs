@@ -397,7 +397,7 @@ fn what_cannot_follow_is_refused_with_the_fix() {
         (scale(-1.0), "0.5 halves both"),
         (scale(f64::NAN), "0.5 halves both"),
         (scale(1e9), "0.5 halves both"),
-        (size([0, 240]), "camera.resized.size_px: must be [width, height]"),
+        (size([0, 240]), "camera.resized.size_px: must be 1 to 32768, not [0, 240]; give [width, height]"),
         (ResizedSpec { scale: Some(0.5), ..binning(2.0) }, "has more than one of binning, scale and size_px"),
     ] {
         let problem = refusal(&pinhole(), spec);

@@ -9,8 +9,6 @@ use crate::{
     },
 };
 
-const BITS: std::ops::RangeInclusive<u32> = 8..=16;
-
 /// Full key of a leaf.
 fn key(leaf: &str) -> String {
     format!("camera.sensor.{leaf}")
@@ -19,10 +17,9 @@ fn key(leaf: &str) -> String {
 pub(super) fn check_image_sensor(check: &mut Check, camera: &CameraSpec) {
     let Some(spec) = &camera.sensor else { return };
     check_light(check, camera, spec);
-    check_noise(check, spec);
+    check_temperature(check, spec);
     check_digits(check, spec);
     check_colors(check, spec);
-    check_flicker(check, spec);
     let photometric = &camera.photometric;
     check.require(photometric.noise_sigma == 0.0, "camera.photometric.noise_sigma", || {
         "belongs to the simple model; with [camera.sensor] set camera.sensor.read_noise_e, and leave it out".into()
@@ -77,14 +74,10 @@ fn check_light(check: &mut Check, camera: &CameraSpec, spec: &ImageSensorSpec) {
             if given == 0 { "is missing, and so is any other scale of the light" } else { "is one of several scales" }
         )
     });
-    for (leaf, value) in ["white_e", "white_lux", "white_w_m2"].into_iter().zip(scales) {
-        value.into_iter().for_each(|value| check.positive(key(leaf), value, "it is what white stands for"));
-    }
     let known = with_facts(spec);
     // What a second scale would need is no remedy.
     let is_one_scale = given == 1;
     let exposure_ms = spec.exposure_ms.unwrap_or(camera.shutter.exposure_ms);
-    check.not_negative(key("exposure_ms"), exposure_ms, "leave it out for camera.shutter.exposure_ms");
     let mut needs = |leaf: &str, is_given: bool, what: &str| {
         check.require(is_given, key(leaf), || format!("is missing: {what}; add it, or give white_e"));
     };
@@ -101,91 +94,35 @@ fn check_light(check: &mut Check, camera: &CameraSpec, spec: &ImageSensorSpec) {
     if is_one_scale && spec.white_lux.is_some() {
         needs("f_number", spec.f_number.is_some(), "it says how much of the scene's light the lens collects");
     }
-    for (leaf, value) in [("f_number", spec.f_number), ("pixel_um", spec.pixel_um)] {
-        value.into_iter().for_each(|value| check.positive(key(leaf), value, "leave it out if it is unknown"));
-    }
-    check.require(
-        spec.lens_transmission > 0.0 && spec.lens_transmission <= 1.0,
-        key("lens_transmission"),
-        || format!("must be above 0 and at most 1, not {}", spec.lens_transmission),
-    );
-    check.positive(key("wavelength_nm"), spec.wavelength_nm, "550 is green");
     check_efficiency(check, spec);
-}
-
-fn check_flicker(check: &mut Check, spec: &ImageSensorSpec) {
-    let Some(flicker) = &spec.flicker else { return };
-    check.positive(key("flicker.hz"), flicker.hz, "100 is that of 50 Hz mains");
-    check.require((0.0..=1.0).contains(&flicker.depth), key("flicker.depth"), || {
-        format!("must be the share of the light that flickers, 0 to 1, not {}", flicker.depth)
-    });
-    check.require(flicker.duty > 0.0 && flicker.duty <= 1.0, key("flicker.duty"), || {
-        format!("must be a share of the period, above 0 and at most 1, not {}", flicker.duty)
-    });
-    check.finite(key("flicker.phase_deg"), &[flicker.phase_deg]);
 }
 
 fn check_efficiency(check: &mut Check, spec: &ImageSensorSpec) {
     let Some(efficiency) = &spec.quantum_efficiency else { return };
-    let (values, fits) = match efficiency {
-        PerChannel::One(value) => (vec![*value], true),
+    let fits = match efficiency {
+        PerChannel::One(_) => true,
         PerChannel::Each(values) => {
             let most = if spec.mosaic == Mosaic::Rgbw { 4 } else { 3 };
-            (values.clone(), spec.mosaic != Mosaic::Mono && (3..=most).contains(&values.len()))
+            spec.mosaic != Mosaic::Mono && (3..=most).contains(&values.len())
         }
     };
     check.require(fits, key("quantum_efficiency"), || {
         "must be one number, or of a sensor with colours [red, green, blue], with rgbw also [red, green, blue, white]".into()
     });
-    check.require(
-        values.iter().all(|value| *value > 0.0 && *value <= 1.0),
-        key("quantum_efficiency"),
-        || format!("must be above 0 and at most 1 electron per photon, not {values:?}"),
-    );
 }
 
-fn check_noise(check: &mut Check, spec: &ImageSensorSpec) {
-    for (leaf, value) in [
-        ("dark_current_e_s", spec.dark_current_e_s.unwrap_or(0.0)),
-        ("read_noise_e", spec.read_noise_e.unwrap_or(0.0)),
-        ("dsnu_e", spec.dsnu_e.unwrap_or(0.0)),
-        ("prnu", spec.prnu.unwrap_or(0.0)),
-        ("row_noise_e", spec.row_noise_e),
-        ("column_noise_e", spec.column_noise_e),
-        ("row_offset_e", spec.row_offset_e),
-        ("column_offset_e", spec.column_offset_e),
-        ("hot_e_s", spec.hot_e_s),
-    ] {
-        check.not_negative(key(leaf), value, "0 is none");
-    }
-    check.finite(key("dark_reference_c"), &[spec.dark_reference_c]);
-    check.positive(key("dark_doubling_c"), spec.dark_doubling_c, "8 is common");
+fn check_temperature(check: &mut Check, spec: &ImageSensorSpec) {
     let doublings = (spec.temperature_c - spec.dark_reference_c) / spec.dark_doubling_c;
     check.require(doublings.abs() <= 64.0, key("temperature_c"), || {
         format!("makes {doublings} doublings of the dark current; at most 64 are possible")
     });
-    for (leaf, value) in [("hot_pixels", spec.hot_pixels), ("dead_pixels", spec.dead_pixels)] {
-        check.require((0.0..=1.0).contains(&value), key(leaf), || {
-            format!("must be a share, 0 to 1, not {value}")
-        });
-    }
 }
 
 fn check_digits(check: &mut Check, spec: &ImageSensorSpec) {
-    for (leaf, value) in [("full_well_e", spec.full_well_e), ("gain_e_per_dn", spec.gain_e_per_dn)] {
-        value.into_iter().for_each(|value| check.positive(key(leaf), value, "leave it out if it is unknown"));
-    }
-    for (leaf, bits) in [("bits", spec.bits), ("adc_bits", spec.adc_bits)] {
-        let bits = bits.unwrap_or(*BITS.start());
-        check.require(BITS.contains(&bits), key(leaf), || format!("must be 8 to 16, not {bits}"));
-    }
     let bits = spec.adc_bits.or(with_facts(spec).bits).unwrap_or(crate::imaging::BITS);
     let most = f64::from((1_u32 << bits.min(16)) - 1);
-    check.require(spec.black_dn >= 0.0 && spec.black_dn < most, key("black_dn"), || {
-        format!(
-            "must be 0 or more and below {most}, the largest number of {bits} bits, not {}",
-            spec.black_dn
-        )
+    check.require(spec.black_dn < most || spec.black_dn.is_nan(), key("black_dn"), || {
+        format!("must be below {most}, the largest number of {bits} bits, not {}", spec.black_dn)
     });
     let is_piecewise = spec.companding == Companding::Piecewise;
     check_curve(
@@ -208,10 +145,6 @@ fn check_curve(check: &mut Check, leaf: &str, is_wanted: bool, wanted_by: &str, 
 }
 
 fn check_colors(check: &mut Check, spec: &ImageSensorSpec) {
-    let matrices = [("spectral_matrix", Some(spec.spectral_matrix)), ("color_matrix", spec.color_matrix)];
-    for (leaf, rows) in matrices {
-        check.finite(key(leaf), &rows.unwrap_or_default());
-    }
     let m = &spec.spectral_matrix;
     let row_sums = m.chunks(3).map(|row| row.iter().sum::<f64>());
     let determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6])
@@ -226,12 +159,6 @@ fn check_colors(check: &mut Check, spec: &ImageSensorSpec) {
     check.require(!is_grey, key("mosaic"), || {
         "is \"mono\", which has neither white_balance nor color_matrix; leave these out".into()
     });
-    if let Some(gains) = spec.white_balance {
-        check.require(gains.iter().all(|gain| gain.is_finite() && *gain > 0.0), key("white_balance"), || {
-            format!("must be gains above 0 of red, green and blue, not {gains:?}")
-        });
-    }
-    check.positive(key("gamma"), spec.gamma, "2.2 is common");
     let is_table = spec.response == ResponseCurve::Table;
     check_curve(check, "response_points", is_table, "response = \"table\"", &spec.response_points);
 }

@@ -1,26 +1,23 @@
 //! Checks of `[camera.resized]`, before and after it is applied.
 
-use super::{Check, Problem, check_focal, validate_camera, validate_cameras, validate_rig};
-use crate::scenario::{CameraSpec, FilesOfSpec, Rig};
+use super::{Check, MAX_SIDE_PX, Problem, validate_camera, validate_cameras, validate_rig};
+use crate::scenario::{CameraSpec, Rig};
 
 /// Checks what states another picture than the camera's own.
 pub(super) fn check_resized(check: &mut Check, camera: &CameraSpec) {
-    if camera.resized.is_some() && camera.size_px.iter().all(|&side| side >= 1) {
+    let is_size = |size_px: &[u32; 2]| size_px.iter().all(|side| (1..=MAX_SIDE_PX).contains(side));
+    // Other sizes are named already.
+    if let Some(resized) = &camera.resized
+        && [Some(camera.size_px), resized.size_px].iter().flatten().all(is_size)
+    {
         check.problems.extend(camera.resized().err().unwrap_or_default());
     }
-    let Some(FilesOfSpec { size_px, focal_px, principal_point_px, part_px }) = camera.files_of else {
-        return;
-    };
-    check.require(size_px.iter().all(|&side| side >= 1), "camera.files_of.size_px", || {
-        format!("must be [width, height] of the picture that the files are of, not {size_px:?}")
-    });
-    check_focal(check, "camera.files_of.focal_px", focal_px);
-    check.finite("camera.files_of.principal_point_px", &principal_point_px);
-    let [_, _, width, height] = part_px;
-    let is_part = part_px.iter().all(|value| value.is_finite()) && width > 0.0 && height > 0.0;
-    check.require(is_part, "camera.files_of.part_px", || {
+    let Some([_, _, width, height]) = camera.files_of.map(|files| files.part_px) else { return };
+    let is_empty = width <= 0.0 || height <= 0.0;
+    check.require(!is_empty, "camera.files_of.part_px", || {
         format!(
-            "must be [left, top, width, height] of the camera's picture in that of the files, not {part_px:?}"
+            "must be [left, top, width, height] of the camera's picture in that of the files, with width and \
+             height above 0, not {width} x {height}"
         )
     });
 }

@@ -155,7 +155,7 @@ mod tests {
         right.clock_offset_ms = f64::NAN;
         let found = problems(vec![camera("left"), right], "sharp");
         assert_eq!(found.len(), 2, "{found:?}");
-        assert!(found[0].starts_with("cameras.1.clock_offset_ms: must lie within"), "{found:?}");
+        assert!(found[0].starts_with("cameras.1.clock_offset_ms: must be -"), "{found:?}");
         assert_eq!(
             found[1],
             "cameras.1.shutter.readout_ms: must be a finite number, 0 or more, not -1; reverse the direction with \

@@ -4,7 +4,7 @@ use super::Check;
 use crate::scenario::{PointSource, Scenario, TracksSpec};
 
 pub(super) fn check_tracks(check: &mut Check, scenario: &Scenario) {
-    let Some(TracksSpec { points, count }) = &scenario.output.tracks else { return };
+    let Some(TracksSpec { points, .. }) = &scenario.output.tracks else { return };
     let key = "output.tracks.points";
     check.require(!points.is_empty(), key, || {
         "is empty; name \"terrain\", \"vertices\", \"board\" or a table, or leave [output.tracks] out".into()
@@ -24,10 +24,4 @@ pub(super) fn check_tracks(check: &mut Check, scenario: &Scenario) {
             format!("names \"{label}\", but there is no {missing}; add it, or leave \"{label}\" out")
         });
     }
-    check.require((1..=TracksSpec::MOST_POINTS).contains(count), "output.tracks.count", || {
-        format!(
-            "must be 1 to {} points of each source, not {count}; 1000 is the default",
-            TracksSpec::MOST_POINTS
-        )
-    });
 }

@@ -1,7 +1,7 @@
 //! Checks of `[[output.twin]]`.
 
 use super::{Check, names, validate};
-use crate::scenario::{BurstOver, Channel, FieldOr, MAX_INSTANTS, Scenario, TwinSpec};
+use crate::scenario::{BurstOver, Channel, FieldOr, Scenario, TwinSpec};
 
 /// Names below the output folder that are taken, beside those of channels.
 const TAKEN: &[&str] = &["inputs", "object_palette", "class_palette", "sensors", "datasets"];
@@ -82,9 +82,6 @@ fn check_burst(check: &mut Check, i: usize, twin: &TwinSpec, scenario: &Scenario
         });
         return;
     };
-    check.require((1..=MAX_INSTANTS).contains(&count), key("instants"), || {
-        format!("must be 1 to {MAX_INSTANTS}, not {count}; leave it out for one picture of each frame")
-    });
     let shutter = &scenario.camera.shutter;
     let is_instant = match twin.over.unwrap_or_default() {
         BurstOver::Exposure => shutter.exposure_ms == 0.0,

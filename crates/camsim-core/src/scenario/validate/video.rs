@@ -4,11 +4,8 @@ use super::Check;
 use crate::scenario::{ImageFormat, Scenario, VideoCodec, VideoSpec};
 
 pub(super) fn check_video(check: &mut Check, scenario: &Scenario) {
-    let VideoSpec { codec, bits, crf } = scenario.output.video;
+    let VideoSpec { codec, bits, .. } = scenario.output.video;
     check.require([8, 10].contains(&bits), "output.video.bits", || format!("must be 8 or 10, not {bits}"));
-    check.require(crf <= VideoSpec::WORST_CRF, "output.video.crf", || {
-        format!("must be 0 (best) to {}, not {crf}; 18 is the default", VideoSpec::WORST_CRF)
-    });
     let is_kept = codec != VideoCodec::Ffv1 || !scenario.output.format.contains(&ImageFormat::Mp4);
     check.require(is_kept, "output.video.codec", || {
         "is \"ffv1\", which mp4 files do not hold; write \"mkv\" in output.format in place of \"mp4\"".into()

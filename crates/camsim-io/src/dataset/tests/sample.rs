@@ -171,7 +171,8 @@ fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
     let mut scenario = scenario.clone();
     scenario.output.format = vec![ImageFormat::Png];
     scenario.output.channels = Channel::ALL
-        .into_iter()
+        .iter()
+        .copied()
         .filter(|channel| columns.iter().any(|c| c.starts_with(channel.name())))
         .collect();
     let manifest = RunManifest {

@@ -1,8 +1,6 @@
 //! Editors of values, by kind.
 
-mod labels;
-
-use camsim_core::scenario::LightSpec;
+use camsim_core::scenario::keys::Key;
 use camsim_io::scenario_file::ValueKind;
 use eframe::egui::{self, Role, Ui};
 use toml::Value;
@@ -15,7 +13,6 @@ use super::super::{
 use crate::{
     document::Document,
     message::{Message, Outbox},
-    params::Param,
 };
 
 /// Keys of twins, all of which but the name may be left out.
@@ -37,31 +34,31 @@ struct Edit {
 }
 
 /// Draws the editor of a key.
-pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: ValueKind, param: &Param, out: &mut Outbox) {
-    let value = document.value(key);
+pub fn show(ui: &mut Ui, document: &Document, key: &str, facts: &Key, out: &mut Outbox) {
+    let (value, kind) = (document.value(key), facts.field.kind);
     let edit = match kind {
-        ValueKind::Number => number(ui, key, value, param, false, out),
-        ValueKind::Whole | ValueKind::Within(..) => number(ui, key, value, param, true, out),
-        ValueKind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
-        ValueKind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
-        ValueKind::Numbers(count) => optional_numbers(ui, document, key, value, param, count, false, out),
-        ValueKind::Counts(count, _) => optional_numbers(ui, document, key, value, param, count, true, out),
-        ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
+        ValueKind::Number => number(ui, key, value, facts, false, out),
+        ValueKind::Whole | ValueKind::Within(..) => number(ui, key, value, facts, true, out),
+        ValueKind::NumberOr(words) => number_or(ui, key, value, facts, words, false, out),
+        ValueKind::CountOr(_, words) => number_or(ui, key, value, facts, words, true, out),
+        ValueKind::Numbers(count) => optional_numbers(ui, document, key, value, facts, count, false, out),
+        ValueKind::Counts(count, _) => optional_numbers(ui, document, key, value, facts, count, true, out),
+        ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, facts, count, word, out),
         // Numbers of frames, which are whole.
-        ValueKind::NumberList if key.starts_with("camera.timing.") => as_written(ui, key, value, param),
-        ValueKind::NumberList => number_list(ui, document, key, value, param, out),
-        ValueKind::Paths if value.is_some_and(Value::is_array) => as_written(ui, key, value, param),
+        ValueKind::NumberList if key.starts_with("camera.timing.") => as_written(ui, key, value, facts),
+        ValueKind::NumberList => number_list(ui, document, key, value, facts, out),
+        ValueKind::Paths if value.is_some_and(Value::is_array) => as_written(ui, key, value, facts),
         ValueKind::Path | ValueKind::Paths => path(ui, document, key, value),
         ValueKind::Flag => flag(ui, key, value),
         ValueKind::Word(words) => word(ui, key, value, words).or_else(|| removal(ui, key, value)),
         ValueKind::Words(words) => word_list(ui, key, value, words).or_else(|| removal(ui, key, value)),
-        ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, param),
-        ValueKind::Text => text(ui, key, value, param),
-        ValueKind::Numbered(..) => numbered(ui, key, value, param),
-        ValueKind::NumberOrNumbers(_) | ValueKind::NumberOrList => as_written(ui, key, value, param),
-        ValueKind::Points(_) if is_of_sensor(key) => as_written(ui, key, value, param),
+        ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, facts),
+        ValueKind::Text => text(ui, key, value, facts),
+        ValueKind::Numbered(..) => numbered(ui, key, value, facts),
+        ValueKind::NumberOrNumbers(_) | ValueKind::NumberOrList => as_written(ui, key, value, facts),
+        ValueKind::Points(_) if is_of_sensor(key) => as_written(ui, key, value, facts),
         // Lists of texts occur in FRAME.toml only.
-        ValueKind::Tables | ValueKind::Texts | ValueKind::Points(_) => None,
+        ValueKind::Table | ValueKind::Tables | ValueKind::Texts | ValueKind::Points(_) => None,
     };
     if let Some(Edit { value, is_dragged }) = edit {
         out.push(Message::Set(key.to_owned(), value, is_dragged));
@@ -83,11 +80,13 @@ fn param_field(
     name: &str,
     label: &str,
     value: f64,
-    param: &Param,
+    facts: &Key,
     whole: bool,
     out: &mut Outbox,
 ) -> Option<(f64, bool)> {
-    let Param { unit, range, speed, tip, .. } = *param;
+    let field = facts.field;
+    let range = [field.low.value().unwrap_or(f64::NEG_INFINITY), field.high.value().unwrap_or(f64::INFINITY)];
+    let (unit, speed, tip) = (&*facts.unit, field.step, field.about);
     drag_value(ui, &NumberField { name, label, unit, range, speed, decimals: 7, whole, tip }, value, out)
 }
 
@@ -99,41 +98,29 @@ fn number(
     ui: &mut Ui,
     key: &str,
     value: Option<&Value>,
-    param: &Param,
+    facts: &Key,
     whole: bool,
     out: &mut Outbox,
 ) -> Option<Edit> {
     let Some(value) = value else {
-        let add = ui.button("set").with_tooltip(param.tip);
+        let add = ui.button("set").with_tooltip(facts.field.about);
         named(&add, Role::Button, &format!("set {key}"));
-        return add.clicked().then(|| to_value(first_value(param), whole)).and_then(single_edit);
+        return add.clicked().then(|| to_value(first_value(facts), whole)).and_then(single_edit);
     };
-    let edit = param_field(ui, key, "", as_f64(value), param, whole, out)
+    let edit = param_field(ui, key, "", as_f64(value), facts, whole, out)
         .map(|(number, is_dragged)| Edit { value: Some(to_value(number, whole)), is_dragged });
-    let may_be_left_out =
-        matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white")
-            || key.starts_with("scene.light.")
-            || key.starts_with(TWINS)
-            || is_of_sensor(key);
+    let may_be_left_out = facts.field.is_optional || key.starts_with("scene.light.") || is_of_sensor(key);
     if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, is_dragged: false });
     }
     edit
 }
 
-/// The value of a key that is newly set.
-fn first_value(param: &Param) -> f64 {
-    let light = LightSpec::default();
-    match param.key {
-        "scene.fog_visibility_m" => 10_000.0,
-        "scene.terrain.ortho_white" => 2047.0,
-        "output.twin.instants" => 9.0,
-        "scene.light.sun_azimuth_deg" => light.sun_azimuth_deg,
-        "scene.light.sun_elevation_deg" => light.sun_elevation_deg,
-        "scene.light.sun" => light.sun,
-        "scene.light.sky" => light.sky,
-        _ => 0.0_f64.clamp(param.range[0], param.range[1]),
-    }
+/// The value of a key that is newly set: its default or example, else the number nearest to 0.
+fn first_value(facts: &Key) -> f64 {
+    let field = facts.field;
+    let known = (field.default)().parse().or_else(|_| field.example.parse());
+    known.unwrap_or_else(|_| field.low.value().unwrap_or(0.0).max(0.0))
 }
 
 /// Draws the button that removes a key; returns whether it was clicked.
@@ -155,7 +142,7 @@ fn number_or(
     ui: &mut Ui,
     key: &str,
     value: Option<&Value>,
-    param: &Param,
+    facts: &Key,
     words: &[&str],
     whole: bool,
     out: &mut Outbox,
@@ -163,17 +150,17 @@ fn number_or(
     let value = value?;
     for word in words {
         let is_word = value.as_str() == Some(word);
-        let response = ui.selectable_label(is_word, *word).with_tooltip(param.tip);
+        let response = ui.selectable_label(is_word, *word).with_tooltip(facts.field.about);
         named(&response, Role::Button, &format!("{key}: {word}"));
         if response.clicked() {
             return if is_word {
-                single_edit(to_value(first_value(param).max(1.0), whole))
+                single_edit(to_value(first_value(facts).max(1.0), whole))
             } else {
                 single_edit(Value::String((*word).into()))
             };
         }
     }
-    if value.is_str() { None } else { number(ui, key, Some(value), param, whole, out) }
+    if value.is_str() { None } else { number(ui, key, Some(value), facts, whole, out) }
 }
 
 /// A list of numbers with labels.
@@ -182,12 +169,15 @@ fn numbers(
     document: &Document,
     key: &str,
     value: Option<&Value>,
-    param: &Param,
+    facts: &Key,
     count: usize,
     whole: bool,
     out: &mut Outbox,
 ) -> Option<Edit> {
-    let labels = labels::element_labels(key, document.scenario.camera.lens.model);
+    let labels = match key.rsplit('.').next() {
+        Some("coefficients") => document.scenario.camera.lens.model.facts().coefficients,
+        _ => facts.field.names,
+    };
     let array = value?.as_array()?;
     let mut edit = None;
     for (index, element) in array.iter().take(count).enumerate() {
@@ -196,7 +186,7 @@ fn numbers(
             &format!("{key}[{index}]"),
             labels.get(index).unwrap_or(&""),
             as_f64(element),
-            param,
+            facts,
             whole,
             out,
         ) {
@@ -214,22 +204,20 @@ fn optional_numbers(
     document: &Document,
     key: &str,
     value: Option<&Value>,
-    param: &Param,
+    facts: &Key,
     count: usize,
     whole: bool,
     out: &mut Outbox,
 ) -> Option<Edit> {
-    let may_be_left_out = matches!(key.rsplit('.').next(), Some("window_s" | "principal_point_px"))
-        || key.starts_with("camera.resized.");
     if value.is_some() {
-        let edit = numbers(ui, document, key, value, param, count, whole, out);
-        return if may_be_left_out && remove(ui, key) {
+        let edit = numbers(ui, document, key, value, facts, count, whole, out);
+        return if facts.field.is_optional && remove(ui, key) {
             Some(Edit { value: None, is_dragged: false })
         } else {
             edit
         };
     }
-    let add = ui.button("set").with_tooltip(param.tip);
+    let add = ui.button("set").with_tooltip(facts.field.about);
     named(&add, Role::Button, &format!("set {key}"));
     let camera = &document.scenario.camera;
     let start = match key.rsplit('.').next() {
@@ -249,13 +237,13 @@ fn numbers_or(
     document: &Document,
     key: &str,
     value: Option<&Value>,
-    param: &Param,
+    facts: &Key,
     count: usize,
     word: &str,
     out: &mut Outbox,
 ) -> Option<Edit> {
     let is_word = value.is_some_and(Value::is_str);
-    let response = ui.selectable_label(is_word, word).with_tooltip(param.tip);
+    let response = ui.selectable_label(is_word, word).with_tooltip(facts.field.about);
     named(&response, Role::Button, &format!("{key}: {word}"));
     if response.clicked() {
         return single_edit(if is_word {
@@ -264,7 +252,7 @@ fn numbers_or(
             Value::String(word.into())
         });
     }
-    if is_word { None } else { numbers(ui, document, key, value, param, count, false, out) }
+    if is_word { None } else { numbers(ui, document, key, value, facts, count, false, out) }
 }
 
 /// A list of any number of numbers.
@@ -273,16 +261,16 @@ fn number_list(
     document: &Document,
     key: &str,
     value: Option<&Value>,
-    param: &Param,
+    facts: &Key,
     out: &mut Outbox,
 ) -> Option<Edit> {
     let Some(array) = value.and_then(Value::as_array) else {
-        let add = ui.button("set").with_tooltip(param.tip);
+        let add = ui.button("set").with_tooltip(facts.field.about);
         named(&add, Role::Button, &format!("set {key}"));
         let start = if key.ends_with("_scale") { 1.0 } else { 0.0 };
         return add.clicked().then(|| Value::Array(vec![Value::Float(start)])).and_then(single_edit);
     };
-    let mut edit = numbers(ui, document, key, value, param, array.len(), false, out);
+    let mut edit = numbers(ui, document, key, value, facts, array.len(), false, out);
     let (more, less) =
         (ui.small_button("+").with_tooltip("one more"), ui.small_button("-").with_tooltip("one less"));
     named(&more, Role::Button, &format!("one more of {key}"));
@@ -328,8 +316,8 @@ fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> O
 }
 
 /// A text, taken when its field loses focus; an empty one removes the key.
-fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
-    let text = finished_text(ui, key, value.and_then(Value::as_str).unwrap_or_default(), param)?;
+fn text(ui: &mut Ui, key: &str, value: Option<&Value>, facts: &Key) -> Option<Edit> {
+    let text = finished_text(ui, key, value.and_then(Value::as_str).unwrap_or_default(), facts)?;
     Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), is_dragged: false })
 }
 
@@ -340,14 +328,14 @@ fn words_or_tables(
     key: &str,
     value: Option<&Value>,
     kind: ValueKind,
-    param: &Param,
+    facts: &Key,
 ) -> Option<Edit> {
     let list = value
         .and_then(Value::as_array)
         .map_or_else(|| value.into_iter().collect(), |list| list.iter().collect::<Vec<_>>());
     let present: Vec<String> =
         list.into_iter().filter_map(Value::as_str).map(|text| document.relative_path(text)).collect();
-    let text = finished_text(ui, key, &present.join(", "), param)?;
+    let text = finished_text(ui, key, &present.join(", "), facts)?;
     let element = |text: &str| {
         Value::String(if kind.is_path(text) { document.resolved_path(text) } else { text.to_owned() })
     };
@@ -357,12 +345,12 @@ fn words_or_tables(
 }
 
 /// A field of text; its text when it loses focus and differs from `present`.
-fn finished_text(ui: &mut Ui, key: &str, present: &str, param: &Param) -> Option<String> {
+fn finished_text(ui: &mut Ui, key: &str, present: &str, facts: &Key) -> Option<String> {
     let id = egui::Id::unique(("text", key));
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
     let response = ui
         .add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none"))
-        .with_tooltip(param.tip);
+        .with_tooltip(facts.field.about);
     named(&response, Role::TextInput, key);
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
@@ -373,11 +361,11 @@ fn finished_text(ui: &mut Ui, key: &str, present: &str, param: &Param) -> Option
 }
 
 /// A table of names with numbers, written `roof = 3, wall = 4`.
-fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, facts: &Key) -> Option<Edit> {
     let pairs = value.and_then(Value::as_table).into_iter().flatten();
     let quoted = |name: &str| Value::String(name.to_owned()).to_string();
     let written: Vec<String> = pairs.map(|(name, value)| format!("{} = {value}", quoted(name))).collect();
-    let edit = text(ui, key, Some(&Value::String(written.join(", "))), param)?;
+    let edit = text(ui, key, Some(&Value::String(written.join(", "))), facts)?;
     let Some(Value::String(text)) = edit.value else { return Some(edit) };
     let parsed = toml::from_str::<toml::Table>(&format!("v = {{ {text} }}")).ok();
     // A text that is no table stays a text, which the schema refuses with a message.
@@ -386,9 +374,9 @@ fn numbered(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Opt
 }
 
 /// A value as it stands in the file, such as `0.1` or `[0.1, 0.2, 0.3]`. An empty text removes the key.
-fn as_written(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+fn as_written(ui: &mut Ui, key: &str, value: Option<&Value>, facts: &Key) -> Option<Edit> {
     let written = value.map(|value| Value::String(value.to_string()));
-    let edit = text(ui, key, written.as_ref(), param)?;
+    let edit = text(ui, key, written.as_ref(), facts)?;
     let Some(Value::String(text)) = edit.value else { return Some(edit) };
     let parsed = toml::from_str::<toml::Table>(&format!("v = {text}")).ok();
     // A text that is no value stays a text, which the schema refuses with a message.

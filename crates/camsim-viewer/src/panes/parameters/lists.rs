@@ -1,15 +1,14 @@
 //! Editors of lists of tables: vibration, zoom calibrations, models, twins, sensors.
 
-use camsim_io::scenario_file::{ValueKind, keys};
+use camsim_io::scenario_file::{ValueKind, find_key, keys};
 use eframe::egui::{Role, Ui};
 use toml::{Table, Value};
 
 use super::super::{tooltips::WithTooltip, widgets::named};
-use super::row_with_param;
+use super::row;
 use crate::{
     document::Document,
     message::{Message, Outbox},
-    params,
     state::State,
 };
 
@@ -28,20 +27,15 @@ pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mu
             }
         });
         ui.indent((key, index), |ui| {
-            for (element, kind) in keys() {
-                let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else {
-                    continue;
-                };
-                if is_in_inner_list(key, element) {
-                    continue;
-                }
-                if let Some(param) = params::find(element) {
-                    row_with_param(ui, state, document, &format!("{key}.{index}.{field}"), *kind, param, out);
+            for element in keys() {
+                let below = element.name.strip_prefix(key).and_then(|rest| rest.strip_prefix('.'));
+                if let Some(field) = below.filter(|_| !is_in_inner_list(key, &element.name)) {
+                    row(ui, state, document, &format!("{key}.{index}.{field}"), element, out);
                 }
             }
         });
     }
-    let tip = params::find(key).map_or("", |param| param.tip);
+    let tip = find_key(key).map_or("", |key| key.field.about);
     let add = ui.button(format!("add {leaf}")).with_tooltip(tip);
     if add.clicked() {
         let mut list = document.value(key).and_then(Value::as_array).cloned().unwrap_or_default();
@@ -55,7 +49,8 @@ fn is_in_inner_list(list: &str, element: &str) -> bool {
     let is_below = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.starts_with('.'));
     keys()
         .iter()
-        .any(|(inner, kind)| *kind == ValueKind::Tables && is_below(inner, list) && is_below(element, inner))
+        .filter(|inner| inner.field.kind == ValueKind::Tables)
+        .any(|inner| is_below(&inner.name, list) && is_below(element, &inner.name))
 }
 
 /// A new entry: the present camera at the next zoom value, a twin without motion blur, a sensor without errors,
