@@ -14,17 +14,19 @@ use std::{
 use camsim::{
     core::{
         camera::CameraModel,
+        flight_log::HeightConversion,
         frame::RenderedFrame,
         pose::CameraPose,
         scenario::{
-            CameraSpec, Channel, ExrCompression, ImageFormat, LensModel, LensSpec, OutputSpec, TrackerKind,
-            TrackerSpec,
+            CameraSpec, Channel, ExrCompression, FlightSpec, ImageFormat, LensModel, LensSpec, OutputSpec,
+            TrackerKind, TrackerSpec,
         },
         scene::{Terrain, TerrainDetail},
         tracker::track,
     },
     engine::Engine,
     io::{
+        flight_log::read_flight_log,
         load::Loaded,
         write::{FrameFiles, FrameWriter},
     },
@@ -50,9 +52,27 @@ fn main() -> Outcome<()> {
     lens_maps(&mut criterion, &loaded)?;
     planning(&mut criterion, &loaded)?;
     terrain(&mut criterion, &loaded)?;
+    reading(&mut criterion)?;
     tracking(&mut criterion, &loaded);
     files(&mut criterion, &loaded)?;
     criterion.final_summary();
+    Ok(())
+}
+
+/// A flight log of 50 000 rows.
+fn reading(criterion: &mut Criterion) -> Outcome<()> {
+    let folder = tempfile::tempdir()?;
+    let (path, mut text) =
+        (folder.path().join("log.csv"), "t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg\n".to_owned());
+    for row in 0..50_000 {
+        let t = f64::from(row) * 0.02;
+        text += &format!("{t:.2},{:.3},{:.3},-100.0,{:.3},2.0,60.0\n", 15.0 * t, 9.0 * t, 5.0 * t.sin());
+    }
+    std::fs::write(&path, text)?;
+    let spec = FlightSpec { log: path.clone(), ..FlightSpec::default() };
+    criterion.bench_function("read log of 50000 rows", |bencher| {
+        bencher.iter(|| read_flight_log(&path, &spec, HeightConversion::None));
+    });
     Ok(())
 }
 

@@ -138,9 +138,7 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
         origin: Default::default(),
         height: Default::default(),
         height_from: Default::default(),
-        topic: None,
-        window_s: None,
-        speed: 1.0,
+        ..FlightSpec::default()
     };
     let mut scenario = Scenario {
         seed: 0,

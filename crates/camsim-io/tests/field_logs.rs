@@ -7,29 +7,13 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion, Note},
-    scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
-        TimeUnit,
-    },
+    scenario::{AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, TimeUnit},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DVec3, EulerRot};
 
 fn spec() -> FlightSpec {
-    FlightSpec {
-        log: PathBuf::new(),
-        format: LogFormat::Auto,
-        time_unit: TimeUnit::Auto,
-        angle_unit: AngleUnit::Auto,
-        angles: AngleKind::Auto,
-        attitude: AttitudeSource::Log,
-        origin: Origin::First,
-        height: HeightReference::Ellipsoid,
-        height_from: HeightSource::Auto,
-        topic: None,
-        window_s: None,
-        speed: 1.0,
-    }
+    FlightSpec::default()
 }
 
 fn track() -> FlightSpec {

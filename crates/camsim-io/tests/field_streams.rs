@@ -3,32 +3,20 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
-        TimeUnit,
-    },
+    scenario::{AttitudeSource, FlightSpec, HeightReference, HeightSource, Origin},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DVec3, EulerRot};
 
 fn spec() -> FlightSpec {
     FlightSpec {
-        log: PathBuf::new(),
-        format: LogFormat::Auto,
-        time_unit: TimeUnit::Auto,
-        angle_unit: AngleUnit::Auto,
-        angles: AngleKind::Auto,
-        attitude: AttitudeSource::Log,
         origin: Origin::Geodetic([47.05, 8.31, 480.0]),
         height: HeightReference::Msl,
-        height_from: HeightSource::Auto,
-        topic: None,
-        window_s: None,
-        speed: 1.0,
+        ..FlightSpec::default()
     }
 }
 

@@ -4,14 +4,11 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
-        TimeUnit,
-    },
+    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat, Origin},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DMat3, DQuat, DVec3, EulerRot};
@@ -19,18 +16,9 @@ use glam::{DMat3, DQuat, DVec3, EulerRot};
 /// Heights above mean sea level, from an origin at 480 m.
 fn spec() -> FlightSpec {
     FlightSpec {
-        log: PathBuf::new(),
-        format: LogFormat::Auto,
-        time_unit: TimeUnit::Auto,
-        angle_unit: AngleUnit::Auto,
-        angles: AngleKind::Auto,
-        attitude: AttitudeSource::Log,
         origin: Origin::Geodetic([47.05, 8.31, 480.0]),
         height: HeightReference::Msl,
-        height_from: HeightSource::Auto,
-        topic: None,
-        window_s: None,
-        speed: 1.0,
+        ..FlightSpec::default()
     }
 }
 

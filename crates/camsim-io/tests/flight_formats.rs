@@ -7,10 +7,7 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion, body_from_euler_deg},
-    scenario::{
-        AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightReference, HeightSource, LogFormat, Origin,
-        TimeUnit,
-    },
+    scenario::{AttitudeSource, FlightSpec, HeightReference, Origin},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::DVec3;
@@ -18,20 +15,7 @@ use glam::DVec3;
 const ORIGIN: [f64; 3] = [47.0, 8.0, 500.0];
 
 fn spec() -> FlightSpec {
-    FlightSpec {
-        log: PathBuf::new(),
-        format: LogFormat::Auto,
-        time_unit: TimeUnit::Auto,
-        angle_unit: AngleUnit::Auto,
-        angles: AngleKind::Auto,
-        attitude: AttitudeSource::Log,
-        origin: Origin::Geodetic(ORIGIN),
-        height: HeightReference::Msl,
-        height_from: HeightSource::Auto,
-        topic: None,
-        window_s: None,
-        speed: 1.0,
-    }
+    FlightSpec { origin: Origin::Geodetic(ORIGIN), height: HeightReference::Msl, ..FlightSpec::default() }
 }
 
 fn topic(topic: &str) -> FlightSpec {

@@ -72,9 +72,7 @@ fn sequence_with(
             origin: Default::default(),
             height: Default::default(),
             height_from: Default::default(),
-            topic: None,
-            window_s: None,
-            speed: 1.0,
+            ..FlightSpec::default()
         },
         tracker: Default::default(),
         camera: Default::default(),
