@@ -34,6 +34,8 @@ class Rows:
     """Unit quaternion that takes optical camera axes to NED, scalar first; shape (N, 4)."""
     velocity_ned_m_s: NDArray[np.float64]
     """Velocity of the optical centre: north, east, down, m/s; shape (N, 3)."""
+    exposure_ns: NDArray[np.int64]
+    """Exposure time, nanoseconds; shape (N,)."""
 
     def __len__(self) -> int:
         return len(self.row)

@@ -1,10 +1,11 @@
 //! Tables of numbers from numpy and to it.
 
-use glam::{DQuat, DVec3};
+use camsim::io::columns::{Column, Get, TableRow, wxyz};
+use glam::DVec3;
 use numpy::{
     Element, IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
-use pyo3::prelude::*;
+use pyo3::{prelude::*, types::PyDict};
 
 use crate::error::input_error;
 
@@ -23,23 +24,28 @@ pub fn vectors<'py, T>(
     table(py, items.iter().flat_map(|item| part(item).to_array()).collect(), 3)
 }
 
-/// A table of a quaternion, scalar first, for each item.
-pub fn quaternions<'py, T>(
-    py: Python<'py>,
-    items: &[T],
-    part: impl Fn(&T) -> DQuat,
-) -> PyResult<Bound<'py, PyAny>> {
-    table(py, items.iter().flat_map(|item| wxyz(part(item))).collect(), 4)
-}
-
 /// An array of a number for each item.
 pub fn column<'py, T, V: Element>(py: Python<'py>, items: &[T], part: impl Fn(&T) -> V) -> Bound<'py, PyAny> {
     items.iter().map(part).collect::<Vec<V>>().into_pyarray(py).into_any()
 }
 
-/// Components of a quaternion, scalar first.
-pub fn wxyz(q: DQuat) -> [f64; 4] {
-    [q.w, q.x, q.y, q.z]
+/// The columns of a table by name.
+pub fn columns<'py, R: TableRow>(py: Python<'py>, rows: &[R]) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for Column { array, get, .. } in R::COLUMNS {
+        let values = match get {
+            Get::Index(get) => column(py, rows, get),
+            Get::Whole(get) => column(py, rows, get),
+            Get::Flag(get) => column(py, rows, get),
+            Get::Number(get) => column(py, rows, get),
+            Get::MaybeNumber(get) => column(py, rows, |row| get(row).unwrap_or(f64::NAN)),
+            Get::Xyz(get) | Get::Ned(get) => vectors(py, rows, get)?,
+            Get::MaybeNed(get) => vectors(py, rows, |row| get(row).unwrap_or(DVec3::NAN))?,
+            Get::Wxyz(get) => table(py, rows.iter().flat_map(|row| wxyz(get(row))).collect(), 4)?,
+        };
+        dict.set_item(array, values)?;
+    }
+    Ok(dict)
 }
 
 /// A table from Python as rows of N numbers.

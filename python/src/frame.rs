@@ -4,17 +4,20 @@ use std::path::PathBuf;
 
 use camsim::{
     core::{
-        frame::{COORDS_CHANNELS, PlaneValues, RenderedFrame, RowRecord},
+        frame::{COORDS_CHANNELS, PlaneValues, RenderedFrame},
         scenario::{Channel, OutputEncoding},
     },
     engine::Finished,
-    io::write::{self, SourceFrame},
+    io::{
+        columns::wxyz,
+        write::{self, SourceFrame},
+    },
 };
 use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{column, quaternions, vectors, wxyz},
+    arrays::columns,
     error::{OrRaise, input_error},
 };
 
@@ -39,21 +42,11 @@ impl Delivery {
         parts.set_item("index", frame.index)?;
         parts.set_item("stamp_ns", frame.stamp_ns)?;
         parts.set_item("size_px", (frame.size_px[0], frame.size_px[1]))?;
-        parts.set_item("rows", rows(py, &frame.rows)?)?;
+        parts.set_item("rows", columns(py, &frame.rows)?)?;
         parts.set_item("source", source_dict(py, &source)?)?;
         parts.set_item("channels", arrays(py, frame, channels)?)?;
         Ok(parts)
     }
-}
-
-fn rows<'py>(py: Python<'py>, rows: &[RowRecord]) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("row", column(py, rows, |row| row.row))?;
-    dict.set_item("t_mid_ns", column(py, rows, |row| row.t_mid_ns))?;
-    dict.set_item("position_ned_m", vectors(py, rows, |row| row.position_ned_m)?)?;
-    dict.set_item("ned_from_camera_wxyz", quaternions(py, rows, |row| row.ned_from_camera)?)?;
-    dict.set_item("velocity_ned_m_s", vectors(py, rows, |row| row.velocity_ned_m_s)?)?;
-    Ok(dict)
 }
 
 fn source_dict<'py>(py: Python<'py>, source: &SourceFrame) -> PyResult<Bound<'py, PyDict>> {

@@ -173,7 +173,7 @@ def test_trajectories_at_instants_of_rows(demo: pathlib.Path) -> None:
 
 
 SENSORS: dict[str, Any] = {
-    "imu": [{"name": "imu0", "rate_hz": 200, "gyro": {"noise_density": 1.7e-4, "random_walk": 2e-5}, "accel": {"noise_density": 2e-3}}],
+    "imu": [{"name": "imu0", "rate_hz": 200, "gyro": {"noise_density": 1.7e-4, "random_walk": 2e-5}, "accel": {"noise_density": 2e-3, "range": 11.8}}],
     "gnss": [{"name": "gnss0", "sigma_m": [1.5, 3.0]}],
     "barometer": [{"name": "baro0"}],
     "magnetometer": [{"name": "mag0", "date": "2025-06-01"}],
@@ -192,6 +192,8 @@ def test_sensors_are_their_tables(pattern: pathlib.Path, tmp_path: pathlib.Path)
     assert np.array_equal(imu.gyro_rad_s, numbers(table, *(f"gyro_{axis}_rad_s" for axis in "xyz")))
     assert np.array_equal(imu.true_accel_m_s2, numbers(table, *(f"true_accel_{axis}_m_s2" for axis in "xyz")))
     assert np.array_equal(imu.ned_from_sensor_wxyz, numbers(table, "true_qw", "true_qx", "true_qy", "true_qz"))
+    assert np.array_equal(imu.is_saturated, numbers(table, "is_saturated")[:, 0])
+    assert imu.is_saturated.dtype == np.bool_ and imu.is_saturated.any() and not imu.is_saturated.all()
     gnss, table = scenario.gnss("gnss0"), tables["gnss0"]
     assert np.array_equal(np.c_[gnss.lat_deg, gnss.lon_deg, gnss.height_m], numbers(table, "lat_deg", "lon_deg", "height_m"))
     assert gnss.has_fix.all() and np.array_equal(gnss.true_velocity_ned_m_s[:, 0], numbers(table, "true_vn_m_s")[:, 0])

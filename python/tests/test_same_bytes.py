@@ -38,6 +38,7 @@ CASES: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "flows": ("assets/pattern.toml", FLOWS, {}),
     "global": ("assets/demo.toml", ["color", "depth"], {"camera.shutter.readout_ms": 0, "camera.shutter.exposure_ms": 0}),
     "interlaced": ("assets/demo.toml", ["color", "coords"], {"camera.shutter.interlace_ms": 16.0}),
+    "global-reset": ("assets/demo.toml", ["rows"], {"camera.shutter.allow_overlap": True, "camera.shutter.reset": "global"}),
     "sideways": ("assets/demo.toml", ["color", "rows"], {"camera.shutter.readout": "left-to-right"}),
     "fisheye": (
         "assets/demo.toml",
@@ -83,6 +84,9 @@ def _compare(channel: str, frame: camsim.Frame, path: pathlib.Path) -> None:
         assert np.array_equal(frame.rows.position_ned_m, numbers(rows, "n", "e", "d"))
         assert np.array_equal(frame.rows.ned_from_camera_wxyz, numbers(rows, "qw", "qx", "qy", "qz"))
         assert np.array_equal(frame.rows.velocity_ned_m_s, numbers(rows, "vn", "ve", "vd"))
+        # Files have the column where rows differ in it.
+        exposure_ns = frame.rows.exposure_ns.tolist()
+        assert exposure_ns == [int(cell) for cell in rows.get("exposure_ns", exposure_ns[:1] * len(exposure_ns))]
         return
     array = frame[channel]
     if path.suffix == ".png":

@@ -27,6 +27,7 @@
 //! | [`frame_file`] | RGB-D frames for `camsim apply` |
 //! | [`dataset`] | output folders in the layouts of other programs |
 //! | [`write`](mod@write) | frames and tables |
+//! | [`columns`] | columns of the tables |
 //! | [`manifest`] | `run.json`; resuming of runs |
 //! | [`merge`](mod@merge) | joining of shards |
 //! | [`inputs`] | fingerprints of input files |
@@ -40,6 +41,7 @@ pub mod board_file;
 pub mod builtin;
 pub mod calibration;
 pub mod camera_file;
+pub mod columns;
 pub mod compare;
 pub mod dataset;
 pub mod flight_log;

@@ -79,15 +79,9 @@ pub use picture::write_picture;
 pub(crate) use png_file::encode as encode_png;
 pub use png_file::{contact_sheet, palette_rgb8};
 pub use rig::{RIG_TOML, rig_names, rig_toml, write_rig};
-pub use sensors::{
-    BAROMETER_COLUMNS, GNSS_COLUMNS, IMU_COLUMNS, MAGNETOMETER_COLUMNS, SENSORS_FOLDER, SensorSummary,
-    kalibr_yaml, write_sensors,
-};
 pub(crate) use sensors::{KalibrFigures, imu_yaml};
-pub use tables::{
-    CAMERA_TRAJECTORY_COLUMNS, CameraRecord, OBJECTS_COLUMNS, ROWS_COLUMNS, TRAJECTORY_COLUMNS,
-    TrajectoryRecord, camera_trajectory_csv, objects_csv, rows_csv, trajectory_csv,
-};
+pub use sensors::{SENSORS_FOLDER, SensorSummary, kalibr_yaml, write_sensors};
+pub use tables::{OBJECTS_COLUMNS, Stamped, objects_csv, rows_csv, trajectory_csv};
 pub use timing::{TIMING_CSV, timing_csv};
 pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
 pub use variations::{VARIATIONS_CSV, VariationsError, variation_folder, write_variations};

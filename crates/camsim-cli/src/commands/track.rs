@@ -14,7 +14,7 @@ use camsim_core::{
 };
 use camsim_io::{
     load::{load_sensors, sensor_warnings},
-    write::{SENSORS_FOLDER, camera_trajectory_csv, trajectory_csv, write_sensors},
+    write::{SENSORS_FOLDER, trajectory_csv, write_sensors},
 };
 use serde::Serialize;
 
@@ -108,7 +108,7 @@ pub fn run(args: &TrackArgs, console: &mut Console<'_>) -> Result<(), Failure> {
                 let path =
                     CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount).or_bad_input()?;
                 warn_of_low_rate(&path, rate_hz, console);
-                camera_trajectory_csv(instants.map(|t_s| camera_at(&path, epoch_ns, t_s)))
+                trajectory_csv(instants.map(|t_s| camera_at(&path, epoch_ns, t_s)))
             }
         };
         write_output(args.output.as_deref(), console, |out| out.write_all(table.as_bytes()))?;

@@ -8,16 +8,17 @@ use std::{
 use anyhow::anyhow;
 use camsim_core::{
     mount::CameraPath,
+    pose::BodyState,
     scenario::{Channel, Scenario, TrajectorySpan},
     sequence::Sequence,
     trajectory::Trajectory,
 };
 use camsim_io::{
+    columns::CameraState,
     portable::write_camera,
     write::{
-        CameraRecord, FrameRecord, FrameTable, SENSORS_FOLDER, SourceFrame, TIMING_CSV, TableKind,
-        TrajectoryRecord, WriteError, camera_trajectory_csv, frames_path, listed_frames, objects_csv,
-        timing_csv, trajectory_csv, write_atomic, write_sensors,
+        FrameRecord, FrameTable, SENSORS_FOLDER, SourceFrame, Stamped, TIMING_CSV, TableKind, WriteError,
+        frames_path, listed_frames, objects_csv, timing_csv, trajectory_csv, write_atomic, write_sensors,
     },
 };
 use camsim_plan::{FramePlan, Planner};
@@ -109,7 +110,7 @@ fn write_trajectories(job: &Job<'_>) -> Result<(), Failure> {
     let Some(seen_s) = seen_s(&of_camera)? else { return Ok(()) };
     let epoch_ns = sequence.platform_epoch_ns();
     let ticks = ticks(&sequence.path.trajectory, sequence.scenario.tracker.rate_hz, seen_s);
-    let optical = camera_trajectory_csv(ticks.map(|t_s| camera_at(&sequence.path, epoch_ns, t_s)));
+    let optical = trajectory_csv(ticks.map(|t_s| camera_at(&sequence.path, epoch_ns, t_s)));
     write_atomic(&job.folder.join(CAMERA_TRAJECTORY_CSV), optical.as_bytes()).or_failed()
 }
 
@@ -280,18 +281,13 @@ fn ticks(trajectory: &Trajectory, rate_hz: f64, seen_s: [f64; 2]) -> impl Iterat
 }
 
 /// A row of `trajectory.csv`.
-pub fn body_at(trajectory: &Trajectory, epoch_ns: i64, t_s: f64) -> TrajectoryRecord {
-    TrajectoryRecord { t_ns: stamp_ns(epoch_ns, t_s), state: trajectory.state(t_s) }
+pub fn body_at(trajectory: &Trajectory, epoch_ns: i64, t_s: f64) -> Stamped<BodyState> {
+    Stamped { t_ns: stamp_ns(epoch_ns, t_s), state: trajectory.state(t_s) }
 }
 
 /// A row of `camera_trajectory.csv`.
-pub fn camera_at(path: &CameraPath, epoch_ns: i64, t_s: f64) -> CameraRecord {
-    CameraRecord {
-        t_ns: stamp_ns(epoch_ns, t_s),
-        pose: path.pose(t_s),
-        velocity_ned_m_s: path.velocity_ned(t_s),
-        rate_camera_rad_s: path.rate_camera(t_s),
-    }
+pub fn camera_at(path: &CameraPath, epoch_ns: i64, t_s: f64) -> Stamped<CameraState> {
+    Stamped { t_ns: stamp_ns(epoch_ns, t_s), state: CameraState::at(path, t_s) }
 }
 
 /// Converts path time to a stamp, nanoseconds.

@@ -8,11 +8,8 @@ use std::{
 use camsim_core::{exposure::FrameExposure, geodesy::Geodetic, pose::CameraPose};
 use camsim_plan::FramePlan;
 
-use super::{
-    WriteError,
-    tables::{push, wxyz},
-    write_atomic,
-};
+use super::{WriteError, numbers::push, write_atomic};
+use crate::columns::wxyz;
 
 /// Columns before those of the paths of a frame's files. The first pose is that of the camera at the stamp.
 /// Columns `ideal_*` describe the pinhole camera whose pixels the source coordinates x, y of `coords` are:

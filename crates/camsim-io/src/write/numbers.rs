@@ -21,6 +21,14 @@ impl fmt::Display for Number {
     }
 }
 
+/// Appends numbers, each with a comma before it.
+pub(super) fn push(line: &mut String, values: &[f64]) {
+    for value in values {
+        line.push(',');
+        line.push_str(Number(*value).digits(&mut zmij::Buffer::new()));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]

@@ -10,19 +10,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::sensors::{SampleTime, SensorInput, Sensors};
+use camsim_core::sensors::{
+    BarometerSample, GnssSample, ImuSample, MagnetometerSample, SampleTime, SensorInput, Sensors,
+};
 
 use super::{WriteError, atomic::write_atomic_with, write_atomic};
+use crate::columns::{TableRow, header, push_line};
 
 mod description;
 mod kalibr;
-mod rows;
 
 use description::Description;
 pub use kalibr::kalibr_yaml;
 pub(crate) use kalibr::{KalibrFigures, imu_yaml};
-pub use rows::{BAROMETER_COLUMNS, GNSS_COLUMNS, IMU_COLUMNS, MAGNETOMETER_COLUMNS};
-use rows::{Line, SensorRow};
 
 /// Folder of the sensors' files, within an output folder.
 pub const SENSORS_FOLDER: &str = "sensors";
@@ -81,20 +81,22 @@ pub fn write_sensors(folder: &Path, sensors: &Sensors) -> Result<SensorSummary, 
     let mut summary = SensorSummary { sensors: descriptions.len(), rows: 0 };
     let mut tables: Vec<Counts> = Vec::new();
     for imu in &sensors.imus {
-        tables.push(write_table(&folder, &imu.spec.name, IMU_COLUMNS, imu.input(), imu.samples())?);
+        let mark = |sample: &ImuSample| (sample.time, sample.is_saturated);
+        tables.push(write_table(&folder, &imu.spec.name, imu.input(), imu.samples(), mark)?);
         let path = folder.join(format!("{}_kalibr.yaml", imu.spec.name));
         write_atomic(&path, kalibr_yaml(&imu.spec).as_bytes())?;
     }
     for gnss in &sensors.gnss {
-        tables.push(write_table(&folder, &gnss.spec.name, GNSS_COLUMNS, gnss.input(), gnss.samples())?);
+        let mark = |sample: &GnssSample| (sample.time, sample.fix.is_none());
+        tables.push(write_table(&folder, &gnss.spec.name, gnss.input(), gnss.samples(), mark)?);
     }
     for barometer in &sensors.barometers {
         let (name, input) = (&barometer.spec.name, barometer.input());
-        tables.push(write_table(&folder, name, BAROMETER_COLUMNS, input, barometer.samples())?);
+        tables.push(write_table(&folder, name, input, barometer.samples(), |air| (air.time, false))?);
     }
     for magnetometer in &sensors.magnetometers {
         let (name, input) = (&magnetometer.spec.name, magnetometer.input());
-        tables.push(write_table(&folder, name, MAGNETOMETER_COLUMNS, input, magnetometer.samples())?);
+        tables.push(write_table(&folder, name, input, magnetometer.samples(), |field| (field.time, false))?);
     }
     for (description, counts) in descriptions.iter().zip(&tables) {
         summary.rows += counts.rows;
@@ -103,24 +105,26 @@ pub fn write_sensors(folder: &Path, sensors: &Sensors) -> Result<SensorSummary, 
     Ok(summary)
 }
 
-/// Writes one table, row by row.
-fn write_table<R: SensorRow>(
+/// Writes one table, row by row. `mark` gives a sample's time, and whether an axis is at the end of its range or there is
+/// no fix.
+fn write_table<R: TableRow>(
     folder: &Path,
     name: &str,
-    columns: &str,
     input: &SensorInput,
     samples: impl Iterator<Item = R>,
+    mark: impl Fn(&R) -> (SampleTime, bool),
 ) -> Result<Counts, WriteError> {
     let mut counts = Counts::default();
     let mut samples = Some(samples);
     write_atomic_with(&folder.join(format!("{name}.csv")), &mut |out| {
-        writeln!(out, "{columns}")?;
-        let mut line = Line::default();
+        writeln!(out, "{}", header(R::COLUMNS))?;
+        let mut line = String::new();
         for sample in samples.take().into_iter().flatten() {
-            counts.add(sample.time(), sample.is_flagged(), input);
-            line.begin();
-            sample.append(&mut line);
-            out.write_all(line.end())?;
+            let (time, is_flagged) = mark(&sample);
+            counts.add(&time, is_flagged, input);
+            line.clear();
+            push_line(&mut line, R::COLUMNS, &sample);
+            out.write_all(line.as_bytes())?;
         }
         Ok(())
     })?;
@@ -139,14 +143,22 @@ fn is_ours(path: &Path) -> bool {
 }
 
 /// Refuses to replace a table that something else has made: one whose description is not camsim's, or whose
-/// columns are not those of a sensor.
+/// columns are not those of a sensor. Tables of inertial units that are older than `is_saturated` count as camsim's.
 fn refuse_foreign(folder: &Path, name: &str) -> Result<(), WriteError> {
     let table = folder.join(format!("{name}.csv"));
     let description = description_path(folder, name);
-    let known = [IMU_COLUMNS, GNSS_COLUMNS, BAROMETER_COLUMNS, MAGNETOMETER_COLUMNS];
+    let known = [
+        header(ImuSample::COLUMNS),
+        header(&ImuSample::COLUMNS[..ImuSample::COLUMNS.len() - 1]),
+        header(GnssSample::COLUMNS),
+        header(BarometerSample::COLUMNS),
+        header(MagnetometerSample::COLUMNS),
+    ];
     let has_our_columns = |file: File| {
         let mut line = String::new();
-        BufReader::new(file).read_line(&mut line).is_ok_and(|_| known.contains(&line.trim_end()))
+        BufReader::new(file)
+            .read_line(&mut line)
+            .is_ok_and(|_| known.iter().any(|known| known == line.trim_end()))
     };
     let foreign = if File::open(&table).is_ok_and(|file| !has_our_columns(file)) {
         table

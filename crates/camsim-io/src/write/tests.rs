@@ -12,6 +12,7 @@ use exr::prelude::read_first_flat_layer_from_file;
 use glam::{DQuat, DVec3};
 
 use super::*;
+use crate::columns::CameraState;
 
 const SIZE: [u32; 2] = [33, 21];
 
@@ -237,18 +238,24 @@ fn tables_have_the_documented_columns() {
         rate_body_rad_s: DVec3::ZERO,
         angular_acceleration_body_rad_s2: DVec3::Z,
     };
-    let text = trajectory_csv(
-        [1_403_636_579_763_555_584, -1_500_000_000].map(|t_ns| TrajectoryRecord { t_ns, state }),
-    );
+    let text =
+        trajectory_csv([1_403_636_579_763_555_584, -1_500_000_000].map(|t_ns| Stamped { t_ns, state }));
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[1].starts_with("1403636579.763555584,1,2,3,0,") && lines[2].starts_with("-1.500000000,"));
     assert!(lines.iter().all(|line| line.split(',').count() == 20));
 
     let pose = CameraPose { position_ned_m: DVec3::ONE, ned_from_camera: DQuat::IDENTITY };
-    let record =
-        CameraRecord { t_ns: 500_000_000, pose, velocity_ned_m_s: DVec3::X, rate_camera_rad_s: DVec3::Z };
-    let text = camera_trajectory_csv([record]);
-    assert_eq!(text, format!("{CAMERA_TRAJECTORY_COLUMNS}\n0.500000000,1,1,1,1,0,0,1,0,0,0,0,0,1\n"));
+    let state = CameraState { pose, velocity_ned_m_s: DVec3::X, rate_camera_rad_s: DVec3::Z };
+    let text = trajectory_csv([Stamped { t_ns: 500_000_000, state }]);
+    let columns = "t_s,n_m,e_m,d_m,vn,ve,vd,qw,qx,qy,qz,wx,wy,wz";
+    assert_eq!(text, format!("{columns}\n0.500000000,1,1,1,1,0,0,1,0,0,0,0,0,1\n"));
+
+    let mut rows = [frame(0).rows[0]; 2];
+    let columns = "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd";
+    let line = "0,-5,0.1,2,-3,1,0,0,0,1,0,0";
+    assert_eq!(rows_csv(&rows), format!("{columns}\n{line}\n{line}\n"));
+    rows[1].exposure_ns = 7;
+    assert_eq!(rows_csv(&rows), format!("{columns},exposure_ns\n{line},0\n{line},7\n"));
 }
 
 #[test]

@@ -15,7 +15,7 @@ use std::{
 use camsim_core::tracks::TrackPoint;
 use camsim_plan::Sighting;
 
-use super::{Number, WriteError, atomic::write_atomic_with, tables::push, write_atomic};
+use super::{Number, WriteError, atomic::write_atomic_with, numbers::push, write_atomic};
 
 /// Columns of `tracks.csv`: pixel coordinates (0, 0 is the centre of the first pixel), instant of the row at
 /// the point on the clock of stamps, planar depth at that instant, 1 if nothing is in front of the point, and

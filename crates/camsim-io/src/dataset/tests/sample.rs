@@ -17,8 +17,8 @@ use crate::{
     manifest::{PATHS, RunManifest},
     scenario_file::parse_scenario,
     write::{
-        FrameFiles, FrameRecord, FrameTable, FrameWriter, SourceFrame, TRACKS_COLUMNS, TrajectoryRecord,
-        frames_path, trajectory_csv, write_atomic,
+        FrameFiles, FrameRecord, FrameTable, FrameWriter, SourceFrame, Stamped, TRACKS_COLUMNS, frames_path,
+        trajectory_csv, write_atomic,
     },
 };
 
@@ -90,7 +90,7 @@ impl Sample {
     /// Writes the run with files in these columns, and its twins likewise.
     pub(super) fn write(&self, columns: &[&str]) {
         write_run(&self.run(), &self.scenario, columns);
-        let body = |t_ns: i64| TrajectoryRecord {
+        let body = |t_ns: i64| Stamped {
             t_ns,
             state: BodyState {
                 position_ned_m: DVec3::new(1.0, 2.0, -3.0),

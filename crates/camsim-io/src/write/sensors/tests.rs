@@ -57,7 +57,7 @@ fn tables_hold_the_samples_to_the_bit() {
     assert_eq!(summary, SensorSummary { sensors: 4, rows: 1201 + 61 + 301 + 301 });
     let sensors_folder = folder.path().join(SENSORS_FOLDER);
     let (header, rows) = table(&sensors_folder.join("imu0.csv"));
-    assert_eq!((header.len(), rows.len()), (30, 1201));
+    assert_eq!((header.len(), rows.len()), (31, 1201));
     let column = |name: &str| header.iter().position(|cell| cell == name).unwrap();
     for (row, sample) in rows.iter().zip(sensors.imus[0].samples()) {
         let number = |name: &str| row[column(name)].parse::<f64>().unwrap();
@@ -71,8 +71,9 @@ fn tables_hold_the_samples_to_the_bit() {
         assert_eq!(number("true_vn_m_s"), sample.velocity_ned_m_s.x);
         assert_eq!(number("true_qw"), sample.ned_from_sensor.w);
         assert_eq!(number("true_qz"), sample.ned_from_sensor.z);
+        assert_eq!(row[30], "1", "up reads 9.8 m/s^2, beyond the range");
     }
-    assert_eq!(rows[200][0], "1700000000000000000", "sample 0 is at the first row of the log");
+    assert_eq!((header[30].as_str(), rows[200][0].as_str()), ("is_saturated", "1700000000000000000"));
     let (header, rows) = table(&sensors_folder.join("gnss0.csv"));
     assert_eq!((header.len(), rows.len()), (24, 61));
     for (row, sample) in rows.iter().zip(sensors.gnss[0].samples()) {
@@ -166,6 +167,16 @@ fn files_of_former_sensors_go_and_those_of_others_stay() {
     assert_ne!(fs::read(path("imu1.csv")).unwrap(), first, "another name has other noise");
     write_sensors(folder.path(), &sensors(&scenario(TEXT))).unwrap();
     assert_eq!(fs::read(path("imu0.csv")).unwrap(), first, "another run writes the same bytes");
+
+    let without_range = scenario(&TEXT.replace(", range = 9", ""));
+    write_sensors(folder.path(), &sensors(&without_range)).unwrap();
+    let (_, rows) = table(&path("imu0.csv"));
+    assert!(rows.iter().all(|row| row[30] == "0"));
+    // Of a version before `is_saturated`.
+    let header = header(ImuSample::COLUMNS).replace(",is_saturated", "");
+    fs::write(path("imu0.csv"), header + "\n").unwrap();
+    write_sensors(folder.path(), &sensors(&without_range)).unwrap();
+    assert_eq!(table(&path("imu0.csv")).1, rows);
 
     fs::write(path("imu0.csv"), "t,x\n1,2\n").unwrap();
     let error = write_sensors(folder.path(), &sensors(&scenario(TEXT))).unwrap_err().to_string();

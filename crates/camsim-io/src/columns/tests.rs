@@ -1,0 +1,106 @@
+//! `docs/reference/COLUMNS.md`; the classes of Python have the arrays of the lists.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use camsim_core::{
+    frame::RowRecord,
+    pose::BodyState,
+    sensors::{BarometerSample, GnssSample, ImuSample, MagnetometerSample},
+};
+
+use super::*;
+
+const HEAD: &str = "\
+# Columns of tables
+
+Made from the lists of columns by `CAMSIM_BLESS=1 cargo test -p camsim-io --lib columns`. Numbers in \
+files have the fewest digits that read back to the same bits, flags are 0 or 1. In Python each line is one array, of a \
+value or a vector for each row. What is not measured is an empty cell in files, and NaN in Python. n, e, d are north, \
+east, down; x, y, z are the axes of body, camera or sensor, from which quaternions (scalar first) lead to north, east, \
+down.
+";
+
+/// Units by the ends of names, the longer ones first.
+const UNITS: [(&str, &str); 10] = [
+    ("_rad_s2", "rad/s^2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s^2"),
+    ("_m_s", "m/s"),
+    ("_m", "m"),
+    ("_ns", "ns"),
+    ("_deg", "degrees"),
+    ("_pa", "Pa"),
+    ("_ut", "microtesla"),
+    ("", ""),
+];
+
+fn unit(array: &str) -> &'static str {
+    UNITS.iter().find(|(end, _)| array.ends_with(end)).unwrap().1
+}
+
+/// numpy's type of a column.
+fn dtype<R>(column: &Column<R>) -> &'static str {
+    match column.get {
+        Get::Index(_) => "uint32",
+        Get::Whole(_) => "int64",
+        Get::Flag(_) => "bool",
+        _ => "float64",
+    }
+}
+
+fn add_table<R: TableRow>(page: &mut String, title: &str, file: &str, python: &str) {
+    *page += &format!("\n## {title}\n\n`{file}`; in Python `{python}`.\n\n");
+    *page += "| file | Python | unit | what |\n|---|---|---|---|\n";
+    if file.contains("trajectory") {
+        *page += "| `t_s` | | s | instant on the clock of stamps, in Python the argument |\n";
+    }
+    for column in R::COLUMNS {
+        let names: Vec<String> = column.names().map(|name| format!("`{name}`")).collect();
+        let width = if names.len() > 1 { format!(", N x {}", names.len()) } else { String::new() };
+        let Column { array, about, .. } = column;
+        let (names, dtype, unit) = (names.join(" "), dtype(column), unit(array));
+        *page += &format!("| {names} | `{array}`: {dtype}{width} | {unit} | {about} |\n");
+    }
+}
+
+#[test]
+fn the_page_is_up_to_date() {
+    let page = &mut HEAD.to_owned();
+    add_table::<RowRecord>(page, "Rows", "rows/frame_000123.csv", "frame.rows");
+    add_table::<BodyState>(page, "Platform", "trajectory.csv", "scenario.trajectory.at(t_s)");
+    add_table::<CameraState>(page, "Camera", "camera_trajectory.csv", "scenario.trajectory.camera_at(t_s)");
+    add_table::<ImuSample>(page, "imu", "sensors/NAME.csv", "scenario.imu()");
+    add_table::<GnssSample>(page, "gnss", "sensors/NAME.csv", "scenario.gnss()");
+    add_table::<BarometerSample>(page, "barometer", "sensors/NAME.csv", "scenario.barometer()");
+    add_table::<MagnetometerSample>(page, "magnetometer", "sensors/NAME.csv", "scenario.magnetometer()");
+    crate::inputs_page::check("../COLUMNS.md", page);
+}
+
+/// Checks that a class has a field for each column, of its type.
+fn check_class<R: TableRow>(module: &str, class: &str) {
+    let (_, rest) = module.split_once(&format!("\nclass {class}")).unwrap();
+    let body = rest.split("\n\n\n").next().unwrap();
+    let field = |line: &str| {
+        let (name, dtype) = line.strip_prefix("    ")?.split_once(": NDArray[np.")?;
+        Some((name.to_owned(), dtype.trim_end_matches(['_', ']']).to_owned()))
+    };
+    let mut fields: Vec<_> = body.lines().filter_map(field).collect();
+    let mut columns: Vec<_> =
+        R::COLUMNS.iter().map(|one| (one.array.to_owned(), dtype(one).to_owned())).collect();
+    fields.sort();
+    columns.sort();
+    assert_eq!(fields, columns, "{class}");
+}
+
+#[test]
+fn the_classes_of_python_have_the_columns() {
+    let frame = include_str!("../../../../python/camsim/frame.py");
+    check_class::<RowRecord>(frame, "Rows:");
+    let trajectory = include_str!("../../../../python/camsim/trajectory.py");
+    check_class::<BodyState>(trajectory, "BodyStates:");
+    check_class::<CameraState>(trajectory, "CameraStates:");
+    check_class::<ImuSample>(trajectory, "ImuSamples(");
+    check_class::<GnssSample>(trajectory, "GnssSamples(");
+    check_class::<BarometerSample>(trajectory, "BarometerSamples(");
+    check_class::<MagnetometerSample>(trajectory, "MagnetometerSamples(");
+}
