@@ -75,7 +75,7 @@ fn tooltips_cover_neither_their_control_nor_its_neighbours() {
         }
     }
     let control = center(&window, "camera.shutter.readout_ms");
-    let shown = tooltip_rect(&mut window, control, "rolling shutter t_r");
+    let shown = tooltip_rect(&mut window, control, "Rolling shutter");
     for other in ["camera.shutter.readout_ms", "camera.shutter.exposure_ms", "camera.shutter.delay_ms"] {
         assert!(shown.left() > rect(&window, other).right(), "{shown} beside the parameters");
     }

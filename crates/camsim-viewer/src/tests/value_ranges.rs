@@ -73,7 +73,7 @@ fn a_drag_beyond_the_range_is_reported() {
     // Tall enough for the key to be on the page: a pointer drags what it sees.
     let mut window = Window::with(Some(pattern()), None, [1200.0, 3000.0]);
     window.settle();
-    let name = "camera.photometric.noise_sigma";
+    let name = "camera.photometric.light";
     let from = window.harness.get_by_label(name).rect().center();
     window.harness.event(Event::PointerMoved(from));
     window.step();
@@ -85,9 +85,9 @@ fn a_drag_beyond_the_range_is_reported() {
     press(&mut window, from - vec2(1740.0, 0.0), false);
     window.step();
     let document = window.state().document.as_ref().expect("open");
-    assert_eq!(document.scenario.camera.photometric.noise_sigma, 0.0);
+    assert_eq!(document.scenario.camera.photometric.light, 0.0);
     assert!(
-        has(&window, &format!("{name}: at the end of its range, 0 or more")),
+        has(&window, &format!("{name}: at the end of its range, 0 x or more")),
         "{:?}",
         window.state().rejected_input
     );
@@ -95,7 +95,7 @@ fn a_drag_beyond_the_range_is_reported() {
     window.step();
     assert!(
         window.state().rejected_input.is_none()
-            && window.state().document.as_ref().expect("open").scenario.camera.photometric.noise_sigma > 0.0
+            && window.state().document.as_ref().expect("open").scenario.camera.photometric.light > 0.0
     );
 }
 

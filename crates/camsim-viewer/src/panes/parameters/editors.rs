@@ -50,7 +50,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, facts: &Key, out: &mut 
         ValueKind::Paths if value.is_some_and(Value::is_array) => as_written(ui, key, value, facts),
         ValueKind::Path | ValueKind::Paths => path(ui, document, key, value),
         ValueKind::Flag => flag(ui, key, value),
-        ValueKind::Word(words) => word(ui, key, value, words).or_else(|| removal(ui, key, value)),
+        ValueKind::Word(words) => word(ui, key, value, words, facts).or_else(|| removal(ui, key, value)),
         ValueKind::Words(words) => word_list(ui, key, value, words).or_else(|| removal(ui, key, value)),
         ValueKind::WordsOrTables(_) => words_or_tables(ui, document, key, value, kind, facts),
         ValueKind::Text => text(ui, key, value, facts),
@@ -401,8 +401,9 @@ fn flag(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
 }
 
 /// One of the given words.
-fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
-    let mut chosen = value.and_then(Value::as_str).unwrap_or_default().to_owned();
+fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str], facts: &Key) -> Option<Edit> {
+    let default = (facts.field.default)();
+    let mut chosen = value.and_then(Value::as_str).unwrap_or(default.trim_matches('"')).to_owned();
     let before = chosen.clone();
     let combo = egui::ComboBox::from_id_salt(key).selected_text(&chosen).show_ui(ui, |ui| {
         for word in words {
