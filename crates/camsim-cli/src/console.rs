@@ -2,12 +2,13 @@
 
 use std::{
     collections::HashSet,
-    ffi::{OsStr, OsString},
+    ffi::OsString,
     fmt,
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
+use camsim_io::shell::quoted;
 use serde::Serialize;
 
 use crate::failure::{DONE, Failure};
@@ -86,7 +87,7 @@ impl<'a> Console<'a> {
     /// The command line as typed.
     #[must_use]
     pub fn command(&self) -> String {
-        self.typed.iter().map(|word| quoted(word.as_os_str())).collect::<Vec<_>>().join(" ")
+        self.typed.iter().map(quoted).collect::<Vec<_>>().join(" ")
     }
 
     /// The command line with one more option.
@@ -102,9 +103,9 @@ impl<'a> Console<'a> {
     pub fn whole(&self, text: &str) -> String {
         let Some((scenario, changes)) = &self.scenario else { return text.to_owned() };
         let camera = self.camera.as_ref().map(|name| format!(" --camera {name}")).unwrap_or_default();
-        let path = quoted(scenario.as_os_str()) + &camera;
+        let path = quoted(scenario) + &camera;
         let variation = self.variation.map(|index| ["--variation".to_owned(), index.to_string()]);
-        let words = changes.iter().chain(variation.iter().flatten()).map(|word| quoted(word.as_ref()));
+        let words = changes.iter().chain(variation.iter().flatten()).map(quoted);
         let with_changes = std::iter::once(path.clone()).chain(words).collect::<Vec<_>>().join(" ");
         text.replace("camsim lens SCENARIO.toml", &format!("camsim lens {path}"))
             .replace("SCENARIO.toml", &with_changes)
@@ -210,18 +211,6 @@ fn visible(text: &str) -> String {
     let shown =
         |c: char| if c.is_control() && c != '\n' { c.escape_default().collect() } else { c.to_string() };
     text.chars().map(shown).collect()
-}
-
-/// A word quoted for a shell.
-#[must_use]
-pub fn quoted(word: &OsStr) -> String {
-    let text = word.to_string_lossy();
-    let is_plain = |c: char| c.is_alphanumeric() || "_./=:,@%+-".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        text.into_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
 }
 
 #[cfg(test)]

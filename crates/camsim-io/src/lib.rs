@@ -33,6 +33,7 @@
 //! | [`inputs`] | fingerprints of input files |
 //! | [`portable`] | relative paths in output folders |
 //! | [`compare`] | comparison of pictures |
+//! | [`shell`] | quotes words of commands |
 //! | [`builtin`] | the built-in demo flight |
 
 #![warn(missing_docs)]
@@ -56,6 +57,7 @@ pub mod merge;
 pub mod pictures;
 pub mod portable;
 pub mod scenario_file;
+pub mod shell;
 pub mod terrain;
 pub mod write;
 

@@ -42,7 +42,6 @@ use glam::DVec3;
 use crate::{pictures::PictureError, wording::range};
 pub use documentation::documentation;
 pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
-pub(crate) use tiff_file::quoted;
 pub(crate) use units::metres_per_unit_name;
 
 use dem::{Dem, EMPTY_RANGE, HeightStatistics, USUAL_HEIGHTS_M, union, widened};

@@ -12,6 +12,7 @@ use std::{
 use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, checked_rig};
 use camsim_io::{
     scenario_file::{CAMERAS, ValueKind, kinds, read_random_scenario, rig_of_table, rig_table},
+    shell::quoted,
     write::write_atomic,
 };
 use toml::{Table, Value};
@@ -267,11 +268,10 @@ impl Document {
     /// The `camsim render` command for an output folder and frames, given as the first and the one after the
     /// last.
     pub fn render_command(&self, folder: &Path, frames: Option<[u64; 2]>) -> String {
-        let mut words =
-            vec!["camsim".to_owned(), "render".to_owned(), shell_quoted(&self.path.display().to_string())];
+        let mut words = vec!["camsim".to_owned(), "render".to_owned(), quoted(&self.path)];
         for (key, value) in self.changes() {
             words.push("--set".to_owned());
-            words.push(shell_quoted(&format!("{key}={value}")));
+            words.push(quoted(format!("{key}={value}")));
         }
         if let Some([first, end]) = frames {
             if self.rig.is_list() {
@@ -279,7 +279,7 @@ impl Document {
             }
             words.extend(["--frames".to_owned(), format!("{first}..{end}")]);
         }
-        words.extend(["-o".to_owned(), shell_quoted(&folder.display().to_string())]);
+        words.extend(["-o".to_owned(), quoted(folder)]);
         words.join(" ")
     }
 
@@ -410,16 +410,6 @@ fn set_in_array(array: &mut Vec<Value>, key: &str, value: Option<Value>) {
         (None, None) => {
             array.remove(index);
         }
-    }
-}
-
-/// Quotes a text as one word of a POSIX shell.
-fn shell_quoted(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
     }
 }
 

@@ -6,10 +6,10 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_io::{portable::write_scenario, write::write_atomic};
+use camsim_io::{portable::write_scenario, shell::quoted, write::write_atomic};
 
 use crate::{
-    console::{Console, quoted},
+    console::Console,
     failure::{Failure, OrFail},
     frame_list::{FrameList, FrameListError},
     inputs::{self, Changes},
@@ -125,13 +125,13 @@ pub fn run(args: &ClusterArgs, console: &mut Console<'_>) -> Result<(), Failure>
 /// The program that renders, for scripts.
 fn program() -> Result<String, Failure> {
     let path = std::env::current_exe().or_failed()?;
-    Ok(format!("camsim=${{CAMSIM:-{}}}", quoted(path.as_os_str())))
+    Ok(format!("camsim=${{CAMSIM:-{}}}", quoted(path)))
 }
 
 fn shard_script(args: &ShardArgs) -> Result<String, Failure> {
     let n = args.shards;
     let frames = args.frames.as_ref().map_or_else(String::new, |frames| format!(" --frames {frames}"));
-    let more: String = args.render.iter().map(|word| format!(" {}", quoted(word.as_ref()))).collect();
+    let more: String = args.render.iter().map(|word| format!(" {}", quoted(word))).collect();
     Ok(format!(
         "#!/bin/sh
 # Renders shard $1 of {n} into shards/$1. Started again, it renders only what is missing.

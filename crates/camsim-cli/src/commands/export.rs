@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use camsim_core::scenario::{DatasetFormat, Scenario, validate};
-use camsim_io::dataset::{DatasetError, ExportOptions, RunFolder, Watch, export, judge_lens, require};
+use camsim_io::{
+    dataset::{DatasetError, ExportOptions, RunFolder, Watch, export, judge_lens, require},
+    shell::quoted,
+};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::render::{RenderArgs, RenderBackend, render};
 use crate::{
-    console::{Console, quoted},
+    console::Console,
     failure::{Failure, OrFail},
     frame_list::{FrameList, whole_number},
     inputs::{self, Changes},
@@ -204,6 +207,6 @@ fn export_run(
     };
     report.notes.iter().for_each(|note| console.note(note));
     let state = if report.was_complete { "was complete" } else { "written" };
-    let (frames, place) = (report.pictures, quoted(folder.as_os_str()));
+    let (frames, place) = (report.pictures, quoted(folder));
     Ok(format!("{} of {frames} pictures {state}: {place}", format.name()))
 }

@@ -217,11 +217,7 @@ pub fn all_inputs<'p>(pictures: impl Iterator<Item = &'p Pictures>) -> Inputs {
 /// Command that renders the missing frames of a folder's scenario.
 #[cfg(feature = "viewer")]
 pub fn resume_command(folder: &Path) -> String {
-    use crate::console::quoted;
+    use camsim_io::shell::quoted;
 
-    format!(
-        "camsim render {} -o {} --resume",
-        quoted(folder.join("run.json").as_os_str()),
-        quoted(folder.as_os_str())
-    )
+    format!("camsim render {} -o {} --resume", quoted(folder.join("run.json")), quoted(folder))
 }

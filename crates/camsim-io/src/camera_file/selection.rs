@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::document::{Document, KeyProblem};
+use crate::shell::quoted;
 
 /// Most names in a message.
 const MOST_NAMES: usize = 12;
@@ -91,14 +92,5 @@ pub(super) fn select(entries: &[CameraEntry<'_>], name: Option<&str>) -> Result<
         (None, _) => {
             Err(KeyProblem::new("cameras", format!("there is no `{name}`; the names are {}", names())))
         }
-    }
-}
-
-/// A name quoted for the shell.
-fn quoted(name: &str) -> String {
-    if name.contains(|c: char| c.is_whitespace() || "'\"$&;()".contains(c)) {
-        format!("'{}'", name.replace('\'', "'\\''"))
-    } else {
-        name.to_owned()
     }
 }

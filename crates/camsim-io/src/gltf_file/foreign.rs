@@ -6,7 +6,7 @@ use camsim_core::geodesy::Geodetic;
 use glam::DVec3;
 use serde_json::Value;
 
-use crate::terrain::quoted;
+use crate::shell::quoted;
 
 /// Bytes of a text that are looked at.
 const START: usize = 4096;
@@ -119,7 +119,7 @@ fn kind(path: &Path, bytes: &[u8]) -> Option<(&'static str, &'static str)> {
 }
 
 fn with_paths(advice: &str, path: &Path) -> String {
-    advice.replace("{in}", &quoted(path)).replace("{out}", &quoted(&path.with_extension("glb")))
+    advice.replace("{in}", &quoted(path)).replace("{out}", &quoted(path.with_extension("glb")))
 }
 
 /// A tile of a batched model: a header, a feature table, a batch table, and a .glb.

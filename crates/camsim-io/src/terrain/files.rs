@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::scenario::FileList;
 
-use super::{TerrainFileError, tiff_file::quoted};
+use super::TerrainFileError;
+use crate::shell::quoted;
 
 /// Endings of files of heights, for folders and patterns.
 const DEM_ENDINGS: [&str; 4] = ["tif", "tiff", "hgt", "asc"];
@@ -138,7 +139,7 @@ pub(super) fn label(paths: &[PathBuf]) -> PathBuf {
 
 /// Paths as words of a command.
 pub(super) fn command_paths(paths: &[&Path]) -> String {
-    let mut words: Vec<String> = paths.iter().take(IN_COMMAND).map(|path| quoted(path)).collect();
+    let mut words: Vec<String> = paths.iter().take(IN_COMMAND).map(quoted).collect();
     words.extend((paths.len() > IN_COMMAND).then(|| "...".to_owned()));
     words.join(" ")
 }

@@ -11,6 +11,8 @@ pub(crate) use blocks::{Image, SampleType, max_decoded_bytes};
 pub(crate) use compression::{COMPRESSIONS, REFUSED};
 pub(crate) use directory::{Directory, TiffFile, is_tiff};
 
+use crate::shell::quoted;
+
 /// Tag numbers.
 pub(crate) mod tag {
     pub const NEW_SUBFILE_TYPE: u16 = 254;
@@ -46,22 +48,12 @@ pub(crate) mod tag {
     pub const RPC_COEFFICIENTS: u16 = 50844;
 }
 
-/// A path as a word of a command.
-pub(crate) fn quoted(path: &std::path::Path) -> String {
-    let text = path.display().to_string();
-    if text.chars().any(|c| c.is_whitespace() || "'\"()&;$".contains(c)) {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    } else {
-        text
-    }
-}
-
 /// The command that converts a file: `gdal_translate OPTIONS IN OUT` with its paths.
 pub(crate) fn gdal_translate(options: &str, path: &std::path::Path) -> String {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     format!(
         "gdal_translate {options} {} {}",
         quoted(path),
-        quoted(&path.with_file_name(format!("{stem}_converted.tif")))
+        quoted(path.with_file_name(format!("{stem}_converted.tif")))
     )
 }
