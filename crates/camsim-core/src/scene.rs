@@ -35,7 +35,10 @@ pub use terrain::{
     TerrainDetail, TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainTiles, TerrainTriangle,
     TerrainVertex, TerrainWalk, WalkHit,
 };
-pub use texture::{Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, srgb_from_linear};
+pub use texture::{
+    Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, linear_from_srgb_f64, srgb_from_linear,
+    srgb_from_linear_f64,
+};
 pub use texture_tiles::{TILE_SIDE, TileGrid, TileSource, is_whole, tile_bytes};
 
 /// A scene.

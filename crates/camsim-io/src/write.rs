@@ -68,7 +68,7 @@ mod video;
 pub use atomic::{is_special, open_special, write_atomic};
 pub(crate) use atomic::{remove_all_temporaries, temporary_path, write_atomic_with};
 pub use channel_pictures::channel_pictures;
-pub use encode::{luminance, srgb_from_linear, srgb8};
+pub use encode::{luminance, srgb8};
 pub(crate) use exr_file::encode as encode_exr;
 pub use frame_table::{
     FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path, listed_frames,

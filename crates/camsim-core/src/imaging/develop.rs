@@ -11,6 +11,7 @@ use super::{
 use crate::{
     frame::RawPicture,
     scenario::{Demosaic, ImageSensorSpec, Mosaic, ResponseCurve},
+    scene::srgb_from_linear,
 };
 
 /// How raw pictures become colours.
@@ -135,8 +136,7 @@ impl Response {
     fn at(&self, value: f32) -> f32 {
         match self {
             Self::Linear => value,
-            Self::Srgb if value <= 0.003_130_8 => 12.92 * value,
-            Self::Srgb => 1.055 * value.powf(1.0 / 2.4) - 0.055,
+            Self::Srgb => srgb_from_linear(value),
             Self::Power(exponent) => value.powf(*exponent),
             Self::Table(points) => between(points, 0, f64::from(value)) as f32,
         }

@@ -69,15 +69,23 @@ impl Wrap {
     }
 }
 
-/// Linear light of an sRGB value in 0..=1 (IEC 61966-2-1).
-pub fn linear_from_srgb(stored: f32) -> f32 {
-    if stored <= 0.04045 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
+/// The curve of sRGB (IEC 61966-2-1) in one precision.
+macro_rules! srgb_curve {
+    ($real:ty, $linear_from_srgb:ident, $srgb_from_linear:ident) => {
+        /// Linear light of an sRGB value in 0..=1 (IEC 61966-2-1).
+        pub fn $linear_from_srgb(stored: $real) -> $real {
+            if stored <= 0.04045 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
+        }
+
+        /// sRGB value of linear light in 0..=1 (IEC 61966-2-1).
+        pub fn $srgb_from_linear(linear: $real) -> $real {
+            if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+        }
+    };
 }
 
-/// sRGB value of linear light in 0..=1 (IEC 61966-2-1), the inverse of [`linear_from_srgb`].
-pub fn srgb_from_linear(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
+srgb_curve!(f32, linear_from_srgb, srgb_from_linear);
+srgb_curve!(f64, linear_from_srgb_f64, srgb_from_linear_f64);
 
 /// A texture, row-major from its top-left pixel, four bytes per pixel. Alpha 0 marks pixels without content.
 #[derive(Clone, PartialEq)]

@@ -2,18 +2,11 @@
 
 use std::sync::LazyLock;
 
+use camsim_core::scene::{linear_from_srgb_f64, srgb_from_linear_f64};
+
 /// Rec. 709 luminance of linear RGB.
 pub fn luminance(rgb: [f32; 3]) -> f32 {
     0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
-}
-
-/// The sRGB transfer function (IEC 61966-2-1) of a linear value in 0..=1.
-pub fn srgb_from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
-
-fn linear_from_srgb(encoded: f64) -> f64 {
-    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Nearest 8-bit code; NaN gives 0.
@@ -38,10 +31,10 @@ struct SrgbTable {
 
 static SRGB: LazyLock<SrgbTable> = LazyLock::new(|| {
     let steps = std::array::from_fn(|code| {
-        if code < 255 { linear_from_srgb((code as f64 + 0.5) / 255.0) as f32 } else { f32::INFINITY }
+        if code < 255 { linear_from_srgb_f64((code as f64 + 0.5) / 255.0) as f32 } else { f32::INFINITY }
     });
     let first = std::array::from_fn(|cell| {
-        (srgb_from_linear(cell as f64 / CELLS as f64) * 255.0 - 0.5).floor().max(0.0) as u8
+        (srgb_from_linear_f64(cell as f64 / CELLS as f64) * 255.0 - 0.5).floor().max(0.0) as u8
     });
     SrgbTable { steps, first }
 });
@@ -68,7 +61,7 @@ mod tests {
     fn table_gives_the_nearest_srgb_code() {
         for i in 0..=200_000 {
             let linear = i as f32 / 200_000.0;
-            let exact = srgb_from_linear(f64::from(linear)) * 255.0;
+            let exact = srgb_from_linear_f64(f64::from(linear)) * 255.0;
             // Half a code, and a little for values that lie on the border between two.
             assert!((f64::from(srgb8(linear)) - exact).abs() < 0.5 + 1e-3, "{linear}");
         }

@@ -6,7 +6,7 @@ use camsim_core::{
     frame::{Plane, PlaneValues, RenderedFrame, RowRecord},
     pose::{BodyState, CameraPose},
     scenario::{Channel, ExrCompression, ExrPixel, ImageFormat, OutputEncoding, OutputSpec},
-    scene::SceneObject,
+    scene::{SceneObject, srgb_from_linear_f64},
 };
 use exr::prelude::read_first_flat_layer_from_file;
 use glam::{DQuat, DVec3};
@@ -148,7 +148,7 @@ fn png_has_the_configured_encoding() {
         match read {
             image::DynamicImage::ImageRgba8(read) if output == OutputEncoding::Srgb8 => {
                 let pixel = read.as_raw()[40 * 4];
-                assert!((f64::from(pixel) - 255.0 * srgb_from_linear(red(40))).abs() <= 0.51);
+                assert!((f64::from(pixel) - 255.0 * srgb_from_linear_f64(red(40))).abs() <= 0.51);
             }
             image::DynamicImage::ImageRgba16(read) => {
                 assert!((f64::from(read.as_raw()[40 * 4]) - 65535.0 * red(40)).abs() <= 0.51);

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use camsim_core::frame::RenderedFrame;
+use camsim_core::{frame::RenderedFrame, scene::srgb_from_linear_f64};
 use camsim_engine::FrameTimes;
-use camsim_io::write::{srgb_from_linear, srgb8};
+use camsim_io::write::srgb8;
 use camsim_plan::FramePlan;
 use eframe::egui::{Color32, ColorImage};
 
@@ -107,7 +107,7 @@ pub fn depth_image(size_px: [u32; 2], depth_m: &[f32], range_m: Option<[f32; 2]>
 pub fn ramp(share: f64) -> [u8; 3] {
     let share = share.clamp(0.0, 1.0);
     let linear = [0.9 * share.powi(2), 0.02 + 0.8 * share, 0.25 * (1.0 - share).powi(2) + 0.08];
-    linear.map(|value| (255.0 * srgb_from_linear(value)).round() as u8)
+    linear.map(|value| (255.0 * srgb_from_linear_f64(value)).round() as u8)
 }
 
 #[cfg(test)]
