@@ -23,7 +23,7 @@ use glam::{DMat3, DQuat, DVec3};
 use thiserror::Error;
 
 use crate::{
-    pose::{BodyState, CameraPose},
+    pose::{BodyState, CameraPose, FRD_FROM_RDF},
     scenario::{Axis, MountSpec},
     trajectory::{Trajectory, so3},
 };
@@ -173,11 +173,10 @@ impl CameraPath {
 /// Rotation from optical camera axes to body axes for roll, pitch, yaw in degrees.
 #[must_use]
 pub fn body_from_camera([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> DQuat {
-    let body_from_forward_camera = DQuat::from_mat3(&DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
     let turned = DQuat::from_rotation_z(yaw_deg.to_radians())
         * DQuat::from_rotation_y(pitch_deg.to_radians())
         * DQuat::from_rotation_x(roll_deg.to_radians());
-    (turned * body_from_forward_camera).normalize()
+    (turned * FRD_FROM_RDF).normalize()
 }
 
 /// Most that two rotation matrices differ that are the same to the rounding of a few products.
@@ -187,8 +186,7 @@ const SAME_ROTATION: f64 = 2e-15;
 /// Where the camera looks straight up or down roll is 0, as only its sum with yaw counts there.
 #[must_use]
 pub fn mount_angles_deg(body_from_camera_axes: DQuat) -> [f64; 3] {
-    let body_from_forward_camera = DQuat::from_mat3(&DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
-    let turned = DMat3::from_quat(body_from_camera_axes * body_from_forward_camera.inverse());
+    let turned = DMat3::from_quat(body_from_camera_axes * FRD_FROM_RDF.inverse());
     // Entries by row and column.
     let m = |row: usize, column: usize| turned.col(column)[row];
     let pitch = (-m(2, 0)).atan2(m(0, 0).hypot(m(1, 0)));

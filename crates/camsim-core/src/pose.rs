@@ -1,7 +1,16 @@
 //! Poses and motion states. The world is local NED in metres (f64), the body FRD, the camera optical (x
 //! right, y down, z forward).
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use glam::{DMat3, DQuat, DVec3};
+
+/// Takes optical camera axes to those of a body that looks the same way.
+pub const FRD_FROM_RDF: DQuat = DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5);
+/// Takes axes forward, right, down to forward, left, up, and back: half a turn about the first.
+pub const FLU_FROM_FRD: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
+/// Takes axes north, east, down to east, north, up, and back: half a turn about north-east.
+pub const ENU_FROM_NED: DQuat = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
 
 /// Full motion state of the platform at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -64,7 +64,7 @@ mod twins;
 mod webdataset;
 
 pub use crate::calibration::Intrinsics;
-pub use axes::{Rigid, enu, enu_from_camera, enu_from_ned, flu_from_frd};
+pub use axes::{Rigid, enu, enu_from_camera};
 pub use requirements::{judge_lens, require};
 pub use run_folder::{PlatformState, RunCamera, RunFolder, RunFrame};
 use target::Target;

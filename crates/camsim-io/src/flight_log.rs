@@ -35,6 +35,7 @@ use camsim_core::{
         FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow,
     },
     geodesy::Geodetic,
+    pose::{ENU_FROM_NED, FLU_FROM_FRD},
     scenario::{AttitudeSource, FlightSpec, LogFormat},
 };
 use glam::{DQuat, DVec3};
@@ -280,14 +281,6 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
     Ok(RawLog { rows, notes, quaternions })
 }
 
-/// Rotation by half a turn about x, which negates y and z.
-const FLU_FROM_FRD: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
-
-/// Rotation by half a turn about the north-east diagonal, which swaps x and y and negates z.
-fn ned_from_enu() -> DQuat {
-    DQuat::from_xyzw(std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0)
-}
-
 /// A row in the frames of camsim: geodetic or north-east-down positions, forward-right-down bodies.
 fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
     let [a, b, c] = row.position;
@@ -305,7 +298,7 @@ fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
         AttitudeKind::Quaternion => {
             let world_from_body = DQuat::from_array(row.attitude);
             RawAttitude::Quaternion(match frame {
-                Frame::EastNorthUp => ned_from_enu() * world_from_body * FLU_FROM_FRD,
+                Frame::EastNorthUp => ENU_FROM_NED * world_from_body * FLU_FROM_FRD,
                 _ => world_from_body,
             })
         }

@@ -5,7 +5,7 @@ use glam::{DMat4, DQuat, DVec3};
 use crate::{
     flight_log::body_from_euler_deg,
     mount::{MountError, Vibration},
-    pose::BodyState,
+    pose::{BodyState, FLU_FROM_FRD, FRD_FROM_RDF},
     scenario::{MountSpec, SensorAxes, SensorMountSpec},
 };
 
@@ -25,8 +25,8 @@ impl SensorMount {
         // Sensor axes at the angles 0, exactly.
         let body_from_axes = match axes {
             SensorAxes::Frd => DQuat::IDENTITY,
-            SensorAxes::Flu => DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0),
-            SensorAxes::Rdf => DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5),
+            SensorAxes::Flu => FLU_FROM_FRD,
+            SensorAxes::Rdf => FRD_FROM_RDF,
         };
         Self {
             body_from_sensor: body_from_euler_deg(spec.angles_deg) * body_from_axes,

@@ -1,8 +1,10 @@
 //! Axes of other programs: world x east, y north, z up (ENU); body x forward, y left, z up (FLU).
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
-use camsim_core::{mount::body_from_camera, pose::CameraPose, scenario::MountSpec};
+use camsim_core::{
+    mount::body_from_camera,
+    pose::{CameraPose, ENU_FROM_NED},
+    scenario::MountSpec,
+};
 use glam::{DQuat, DVec3};
 
 /// A rigid transformation `a_from_b`: `x_a = rotation x_b + translation_m`.
@@ -59,18 +61,6 @@ impl Rigid {
     }
 }
 
-/// Rotation of NED coordinates into ENU.
-#[must_use]
-pub fn enu_from_ned() -> DQuat {
-    DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0)
-}
-
-/// Rotation between forward, right, down and forward, left, up, either way.
-#[must_use]
-pub fn flu_from_frd() -> DQuat {
-    DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0)
-}
-
 /// A point or vector in NED, in ENU; exact.
 #[must_use]
 pub fn enu(ned: DVec3) -> DVec3 {
@@ -81,25 +71,27 @@ pub fn enu(ned: DVec3) -> DVec3 {
 #[must_use]
 pub fn enu_from_camera(pose: &CameraPose) -> Rigid {
     Rigid {
-        rotation: (enu_from_ned() * pose.ned_from_camera).normalize(),
+        rotation: (ENU_FROM_NED * pose.ned_from_camera).normalize(),
         translation_m: enu(pose.position_ned_m),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use camsim_core::pose::{FLU_FROM_FRD, FRD_FROM_RDF};
+
     use super::*;
 
     #[test]
     fn axes_are_those_that_their_names_say() {
         for ned in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, -2.0, 3.0)] {
             // The quaternion has rounded roots.
-            assert!((enu_from_ned() * ned - enu(ned)).length() < 1e-14);
+            assert!((ENU_FROM_NED * ned - enu(ned)).length() < 1e-14);
         }
-        assert_eq!(flu_from_frd() * DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, -2.0, -3.0));
+        assert_eq!(FLU_FROM_FRD * DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, -2.0, -3.0));
         // A camera that looks north, level.
-        let ned_from_camera = DQuat::from_mat3(&glam::DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X));
-        let pose = CameraPose { position_ned_m: DVec3::new(10.0, 20.0, -30.0), ned_from_camera };
+        let pose =
+            CameraPose { position_ned_m: DVec3::new(10.0, 20.0, -30.0), ned_from_camera: FRD_FROM_RDF };
         let camera = enu_from_camera(&pose);
         assert_eq!(camera.translation_m, DVec3::new(20.0, 10.0, 30.0));
         assert!((camera.rotation * DVec3::Z - DVec3::Y).length() < 1e-14, "z looks north, which is y");

@@ -1,11 +1,14 @@
 //! The formats, and what each has no place for.
 
-use camsim_core::scenario::{CameraSpec, Readout, Reset};
+use camsim_core::{
+    pose::FLU_FROM_FRD,
+    scenario::{CameraSpec, Readout, Reset},
+};
 use toml::{Table, Value};
 
 use super::{
     Calibration, CalibrationError, ImuReference,
-    axes::{Rigid, flu_from_frd},
+    axes::Rigid,
     basalt, camodocal, colmap, euroc,
     kalibr::{PoseKey, chain_yaml},
     lens_names, nerfstudio, opencv, orb_slam, ros, stmap,
@@ -171,7 +174,7 @@ impl CalibrationFormat {
 /// The format holds one camera, or does not have the lens of one of them.
 pub fn export(cameras: &[CameraSpec], format: CalibrationFormat) -> Result<Exported, CalibrationError> {
     let all = cameras.iter().map(Calibration::new).collect::<Result<Vec<_>, _>>()?;
-    let platform = ImuReference { body_from_imu: Rigid::turn(flu_from_frd()), clock_offset_s: 0.0 };
+    let platform = ImuReference { body_from_imu: Rigid::turn(FLU_FROM_FRD), clock_offset_s: 0.0 };
     let one = match &all[..] {
         [one] => Ok(one),
         _ => Err(CalibrationError::Refused(format!(

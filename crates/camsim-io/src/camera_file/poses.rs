@@ -2,6 +2,7 @@
 
 use camsim_core::{
     mount::mount_angles_deg,
+    pose::FLU_FROM_FRD,
     scenario::{CameraSpec, MountSpec},
 };
 use glam::{DMat3, DQuat, DVec3};
@@ -10,10 +11,7 @@ use serde_json::Value;
 use super::document::{Document, KeyProblem, find, number, numbers, one_of, optional_number};
 use super::format::CameraFormat;
 use super::selection::CameraEntry;
-use crate::calibration::{
-    axes::{Rigid, flu_from_frd},
-    text::shortest,
-};
+use crate::calibration::{axes::Rigid, text::shortest};
 
 /// Axes of the body or inertial sensor to which the poses of a file refer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,7 +26,7 @@ pub enum BodyAxes {
 impl BodyAxes {
     fn body_from_file(self) -> Rigid {
         match self {
-            Self::Flu => Rigid::turn(flu_from_frd()),
+            Self::Flu => Rigid::turn(FLU_FROM_FRD),
             Self::Frd => Rigid::IDENTITY,
         }
     }

@@ -7,6 +7,7 @@ use std::{
     io::{self, BufWriter},
 };
 
+use camsim_core::pose::FLU_FROM_FRD;
 use mcap::records::MessageHeader;
 use serde::Serialize;
 
@@ -149,7 +150,7 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
 
 /// Transformations that hold for good.
 fn fixed<'a>(job: &ExportJob<'_>, imus: &[super::imu::ImuSensor], t_ns: i64) -> Vec<StampedTransform<'a>> {
-    let base_from_body = super::Rigid::turn(super::flu_from_frd());
+    let base_from_body = super::Rigid::turn(FLU_FROM_FRD);
     let cameras = job.run.cameras.iter().enumerate().filter(|(_, camera)| !camera.vibrates());
     let cameras = cameras.map(|(i, camera)| (format!("cam{i}"), camera.body_from_camera()));
     let imus = imus

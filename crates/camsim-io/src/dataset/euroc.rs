@@ -2,12 +2,15 @@
 
 use std::io::Write;
 
-use camsim_core::scenario::{Readout, Reset};
+use camsim_core::{
+    pose::ENU_FROM_NED,
+    scenario::{Readout, Reset},
+};
 use glam::DVec3;
 
 use super::{
     DatasetError, ExportJob,
-    axes::{Rigid, enu, enu_from_ned},
+    axes::{Rigid, enu},
     imu::{ImuSensor, body_from_b, imus},
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
     pictures::{self, Samples},
@@ -150,7 +153,7 @@ fn write_truth(
         while let Some(state) = rows.next_state()? {
             let lever_m = body_from_b.translation_m;
             let position = enu(state.position_ned_m + state.ned_from_body * lever_m);
-            let attitude = wxyz(enu_from_ned() * state.ned_from_body * body_from_b.rotation);
+            let attitude = wxyz(ENU_FROM_NED * state.ned_from_body * body_from_b.rotation);
             let swing = state.ned_from_body * state.rate_body_rad_s.cross(lever_m);
             let velocity = enu(state.velocity_ned_m_s + swing);
             let [gyro, acc] = match &mut biases {

@@ -2,16 +2,11 @@
 
 use std::path::PathBuf;
 
-use camsim_core::scenario::SensorCarrier;
+use camsim_core::{pose::FLU_FROM_FRD, scenario::SensorCarrier};
 use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 
-use super::{
-    DatasetError, RunCamera, RunFolder,
-    axes::{Rigid, flu_from_frd},
-    csv_rows::CsvRows,
-    run_folder::PlatformRows,
-};
+use super::{DatasetError, RunCamera, RunFolder, axes::Rigid, csv_rows::CsvRows, run_folder::PlatformRows};
 use crate::{
     calibration::ImuReference,
     write::{KalibrFigures, SENSORS_FOLDER},
@@ -142,7 +137,7 @@ pub(super) fn imus(run: &RunFolder) -> Result<Vec<ImuSensor>, DatasetError> {
 /// Axes of the body B of EuRoC and others: those of the first inertial sensor, else the platform's, x forward, y
 /// left, z up.
 pub(super) fn body_from_b(imu: Option<&ImuSensor>) -> Rigid {
-    imu.map_or_else(|| Rigid::turn(flu_from_frd()), |imu| imu.body_from_imu)
+    imu.map_or_else(|| Rigid::turn(FLU_FROM_FRD), |imu| imu.body_from_imu)
 }
 
 /// Columns of its table: stamp, gyroscope, accelerometer, their biases, true time.

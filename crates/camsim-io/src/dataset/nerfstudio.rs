@@ -2,12 +2,11 @@
 
 use std::io::Write;
 
-use camsim_core::pose::CameraPose;
-use glam::DQuat;
+use camsim_core::pose::{CameraPose, FLU_FROM_FRD};
 
 use super::{
     DatasetError, ExportJob,
-    axes::{Rigid, enu_from_camera, flu_from_frd},
+    axes::{Rigid, enu_from_camera},
     depth::DepthScale,
     euroc::timing,
     page::{PIXEL_CENTRE_HALF, Page, WORLD},
@@ -65,8 +64,8 @@ fn picture(folder: &str, prefix: &str, frame: &RunFrame) -> String {
 /// World from OpenGL camera axes: x right, y up, z backwards.
 pub(super) fn enu_from_gl(pose: &CameraPose) -> Rigid {
     // The same half turn about x as from right, down, forward.
-    let optical_from_gl: DQuat = flu_from_frd();
-    enu_from_camera(pose).of(&Rigid::turn(optical_from_gl))
+    let optical_from_gl = Rigid::turn(FLU_FROM_FRD);
+    enu_from_camera(pose).of(&optical_from_gl)
 }
 
 fn write_transforms(

@@ -1,9 +1,12 @@
 //! Attitudes that contradict the flight: the body not upright, or one attitude while the path turns.
 
-use camsim_core::flight_log::{FlightLog, LogRow, Note, RawAttitude, RawRow};
+use camsim_core::{
+    flight_log::{FlightLog, LogRow, Note, RawAttitude, RawRow},
+    pose::{ENU_FROM_NED, FLU_FROM_FRD},
+};
 use glam::{DQuat, DVec3, EulerRot};
 
-use super::{FLU_FROM_FRD, RawLog, ned_from_enu};
+use super::RawLog;
 
 /// Rows that are looked at.
 const MAX_ROWS: usize = 2000;
@@ -109,9 +112,8 @@ fn in_the_other_order(attitudes: &[DQuat], reading: QuaternionReading) -> Vec<DQ
         true => DQuat::from_xyzw(q.w, q.x, q.y, q.z),
         false => DQuat::from_xyzw(q.y, q.z, q.w, q.x),
     };
-    let in_enu = |q: DQuat| {
-        ned_from_enu() * reorder(ned_from_enu().inverse() * q * FLU_FROM_FRD.inverse()) * FLU_FROM_FRD
-    };
+    let in_enu =
+        |q: DQuat| ENU_FROM_NED * reorder(ENU_FROM_NED.inverse() * q * FLU_FROM_FRD.inverse()) * FLU_FROM_FRD;
     attitudes.iter().map(|&q| if reading.is_enu { in_enu(q) } else { reorder(q) }).collect()
 }
 
