@@ -13,9 +13,8 @@ use serde::Serialize;
 
 use super::{
     DatasetError, ExportJob,
-    euroc::timing,
     imu::imus,
-    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD, timing},
     stereo,
 };
 
@@ -197,8 +196,5 @@ fn page(job: &ExportJob<'_>, notes: &[String]) -> String {
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("time of cam{i}"), &timing(camera));
     }
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
+    page.ending(notes)
 }

@@ -5,8 +5,7 @@
 
 use super::{
     DatasetError, ExportJob,
-    euroc::timing,
-    page::{OPTICAL, PIXEL_CENTRE_HALF, Page, WORLD},
+    page::{OPTICAL, PIXEL_CENTRE_HALF, Page, WORLD, timing},
     run_folder::RunFrame,
 };
 
@@ -79,8 +78,5 @@ fn page(job: &ExportJob<'_>, notes: &[String]) -> String {
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("shutter of camera {}", i + 1), &timing(camera));
     }
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
+    page.ending(notes)
 }

@@ -2,17 +2,14 @@
 
 use std::io::Write;
 
-use camsim_core::{
-    pose::ENU_FROM_NED,
-    scenario::{Readout, Reset},
-};
+use camsim_core::pose::ENU_FROM_NED;
 use glam::DVec3;
 
 use super::{
     DatasetError, ExportJob,
     axes::{Rigid, enu},
     imu::{ImuSensor, body_from_b, imus},
-    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    page::{MASK, OPTICAL, PIXEL_CENTRE_0, Page, WORLD, timing},
     pictures::{self, Samples},
     receivers,
     run_folder::RunCamera,
@@ -193,7 +190,7 @@ fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, receivers: &[String], note
         .line("quaternions", "w x y z, world from B, w not negative")
         .line("pixels", PIXEL_CENTRE_0)
         .line("pictures", Samples::of_estimators(job).words())
-        .line("`mask.png`", "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere")
+        .line("`mask.png`", MASK)
         .line(
             "stamps",
             "nanoseconds, of each sensor by its own clock; a camera's delay is in them. Names of pictures have 19 digits",
@@ -216,62 +213,5 @@ fn page(job: &ExportJob<'_>, imu: Option<&ImuSensor>, receivers: &[String], note
     page.note(
         "`settings` holds `times_camN.txt` (ORB-SLAM3's list of stamps) and settings of other programs.",
     );
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
-}
-
-/// When rows are exposed, in words.
-pub(super) fn timing(camera: &RunCamera) -> String {
-    let shutter = &camera.shutter;
-    let [delay_ms, readout_ms] = [shutter.delay_s(), shutter.readout_s()].map(|s| 1e3 * s);
-    let centre = if delay_ms == 0.0 {
-        "the image's centre is exposed at the stamp (middle of the exposure)".to_owned()
-    } else {
-        format!("the image's centre is exposed {delay_ms} ms before the stamp (middle of the exposure)")
-    };
-    let offset_ms = camera.spec.clock_offset_ms;
-    let centre = match offset_ms == 0.0 {
-        true => centre,
-        false => format!("{centre}, by the camera's own clock, which is {offset_ms} ms ahead of the run's"),
-    };
-    let centre = match camera.spec.timing {
-        None => centre,
-        Some(_) => format!(
-            "{centre}; stamps have the faults of camera.timing, poses and trajectories the true times"
-        ),
-    };
-    if readout_ms == 0.0 {
-        return format!("{centre}; global shutter");
-    }
-    // With a global reset mid-exposures are half as far apart as rows are read.
-    let (resets_globally, lines, direction) =
-        (shutter.reset() == Reset::Global, shutter.lines(), direction(camera));
-    let apart_ms = if resets_globally { 0.5 * readout_ms } else { readout_ms };
-    let share = match camera.spec.shutter.readout {
-        Readout::MiddleOutward => "(|2y + 1 - N| - 1)/N",
-        Readout::EdgesInward => "(1 - |2y + 1 - N|)/N",
-        _ => "((y + 0.5)/N - 0.5)",
-    };
-    let growing = match resets_globally {
-        true => {
-            format!("; exposures begin at once and are {readout_ms} ms longer from the first row to the last")
-        }
-        false => String::new(),
-    };
-    format!(
-        "{centre}; row (or column) y of N = {lines} is exposed {share} {apart_ms} ms later, read {direction}{growing}"
-    )
-}
-
-fn direction(camera: &RunCamera) -> &'static str {
-    match camera.spec.shutter.readout {
-        Readout::TopToBottom => "from top to bottom",
-        Readout::BottomToTop => "from bottom to top (y from there)",
-        Readout::LeftToRight => "from left to right",
-        Readout::RightToLeft => "from right to left (y from there)",
-        Readout::MiddleOutward => "in halves at once, from the middle outward",
-        Readout::EdgesInward => "in halves at once, from the edges inward",
-    }
+    page.ending(notes)
 }

@@ -8,8 +8,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use super::{
     DatasetError, ExportJob,
     depth::{png16, read_planes},
-    euroc::timing,
-    page::{PIXEL_CENTRE_0, Page},
+    page::{PIXEL_CENTRE_0, Page, timing},
     run_folder::{RunCamera, RunFrame},
 };
 
@@ -140,5 +139,5 @@ fn page(job: &ExportJob<'_>) -> String {
         "A scene holds pictures whose numbers follow each other; it has one flow less than pictures, as RAFT's loader \
          wants.",
     );
-    page.text().to_owned()
+    page.ending(&[])
 }

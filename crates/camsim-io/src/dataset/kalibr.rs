@@ -6,9 +6,8 @@ use camsim_core::scenario::BoardKind;
 
 use super::{
     DatasetError, ExportJob,
-    euroc::timing,
     imu::{ImuSensor, imus},
-    page::{OPTICAL, PIXEL_CENTRE_0, Page},
+    page::{MASK, OPTICAL, PIXEL_CENTRE_0, Page, timing},
     pictures::{self, Samples},
     run_folder::RunCamera,
     stamps::name_ns,
@@ -96,7 +95,7 @@ fn page(job: &ExportJob<'_>, imus: &[ImuSensor], notes: &[String]) -> String {
     let samples = Samples::of_estimators(job);
     page.line("names", "`camN/NS.png`, the stamp in nanoseconds with 19 digits")
         .line("pictures", samples.words())
-        .line("`mask_camN.png`", "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere")
+        .line("`mask_camN.png`", MASK)
         .line("camera", OPTICAL)
         .line("pixels", PIXEL_CENTRE_0)
         .line(
@@ -112,8 +111,5 @@ fn page(job: &ExportJob<'_>, imus: &[ImuSensor], notes: &[String]) -> String {
         page.line(&format!("shutter of cam{i}"), &timing(camera));
     }
     page.note("`kalibr_bagcreater --folder . --output-bag run.bag` makes a bag of it.");
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
+    page.ending(notes)
 }

@@ -6,9 +6,8 @@ use super::{
     DatasetError, ExportJob,
     axes::{Rigid, enu_from_camera},
     depth::DepthScale,
-    euroc::timing,
     flow::FlowPlane,
-    page::{OPTICAL, PIXEL_CENTRE_0, Page},
+    page::{OPTICAL, PIXEL_CENTRE_0, Page, timing},
     pictures::{self, Samples},
     run_folder::{RunCamera, RunFrame},
     stereo,
@@ -205,8 +204,5 @@ fn page(job: &ExportJob<'_>, views: &[RunCamera], sequences: &[Vec<usize>], note
         page.line(&format!("cameras of sequence {i:02}"), &cameras_of(views, sequence));
         page.line(&format!("shutter of sequence {i:02}"), &timing(&views[sequence[0]]));
     }
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
+    page.ending(notes)
 }

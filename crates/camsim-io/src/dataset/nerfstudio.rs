@@ -8,8 +8,7 @@ use super::{
     DatasetError, ExportJob,
     axes::{Rigid, enu_from_camera},
     depth::DepthScale,
-    euroc::timing,
-    page::{PIXEL_CENTRE_HALF, Page, WORLD},
+    page::{PIXEL_CENTRE_HALF, Page, WORLD, timing},
     run_folder::{RunCamera, RunFrame},
 };
 use crate::{calibration::nerfstudio::model, write::Number};
@@ -136,8 +135,5 @@ fn page(job: &ExportJob<'_>, scale: Option<&DepthScale>, notes: &[String]) -> St
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("shutter of cam{i}"), &timing(camera));
     }
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
+    page.ending(notes)
 }

@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::ExportJob;
+use camsim_core::scenario::{Readout, Reset};
+
+use super::{ExportJob, run_folder::RunCamera};
 
 /// The page, as it is put together.
 pub(super) struct Page {
@@ -49,8 +51,9 @@ impl Page {
         self
     }
 
-    pub(super) fn text(&self) -> &str {
-        &self.text
+    /// The text, with paragraphs at its end.
+    pub(super) fn ending(&self, notes: &[String]) -> String {
+        notes.iter().fold(self.text.clone(), |text, note| text + "\n" + note + "\n")
     }
 }
 
@@ -59,8 +62,65 @@ pub(super) const WORLD: &str = "x east, y north, z up, metres, from the run's or
                                 down: (x, y, z) = (e, n, -d)";
 /// Optical axes.
 pub(super) const OPTICAL: &str = "x right, y down, z forward, as in camsim";
+/// Masks of estimators.
+pub(super) const MASK: &str =
+    "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere";
 /// Pixel coordinates as in OpenCV.
 pub(super) const PIXEL_CENTRE_0: &str =
     "(0, 0) is the centre of the first pixel, as in camsim and OpenCV; nothing is shifted";
 /// Pixel coordinates from the corner.
 pub(super) const PIXEL_CENTRE_HALF: &str = "(0.5, 0.5) is the centre of the first pixel: 0.5 is added to camsim's cx, cy and to all pixel coordinates";
+
+/// When rows are exposed, in words.
+pub(super) fn timing(camera: &RunCamera) -> String {
+    let shutter = &camera.shutter;
+    let [delay_ms, readout_ms] = [shutter.delay_s(), shutter.readout_s()].map(|s| 1e3 * s);
+    let centre = if delay_ms == 0.0 {
+        "the image's centre is exposed at the stamp (middle of the exposure)".to_owned()
+    } else {
+        format!("the image's centre is exposed {delay_ms} ms before the stamp (middle of the exposure)")
+    };
+    let offset_ms = camera.spec.clock_offset_ms;
+    let centre = match offset_ms == 0.0 {
+        true => centre,
+        false => format!("{centre}, by the camera's own clock, which is {offset_ms} ms ahead of the run's"),
+    };
+    let centre = match camera.spec.timing {
+        None => centre,
+        Some(_) => format!(
+            "{centre}; stamps have the faults of camera.timing, poses and trajectories the true times"
+        ),
+    };
+    if readout_ms == 0.0 {
+        return format!("{centre}; global shutter");
+    }
+    // With a global reset mid-exposures are half as far apart as rows are read.
+    let (resets_globally, lines, direction) =
+        (shutter.reset() == Reset::Global, shutter.lines(), direction(camera));
+    let apart_ms = if resets_globally { 0.5 * readout_ms } else { readout_ms };
+    let share = match camera.spec.shutter.readout {
+        Readout::MiddleOutward => "(|2y + 1 - N| - 1)/N",
+        Readout::EdgesInward => "(1 - |2y + 1 - N|)/N",
+        _ => "((y + 0.5)/N - 0.5)",
+    };
+    let growing = match resets_globally {
+        true => {
+            format!("; exposures begin at once and are {readout_ms} ms longer from the first row to the last")
+        }
+        false => String::new(),
+    };
+    format!(
+        "{centre}; row (or column) y of N = {lines} is exposed {share} {apart_ms} ms later, read {direction}{growing}"
+    )
+}
+
+fn direction(camera: &RunCamera) -> &'static str {
+    match camera.spec.shutter.readout {
+        Readout::TopToBottom => "from top to bottom",
+        Readout::BottomToTop => "from bottom to top (y from there)",
+        Readout::LeftToRight => "from left to right",
+        Readout::RightToLeft => "from right to left (y from there)",
+        Readout::MiddleOutward => "in halves at once, from the middle outward",
+        Readout::EdgesInward => "in halves at once, from the edges inward",
+    }
+}

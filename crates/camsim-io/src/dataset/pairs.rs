@@ -10,9 +10,8 @@ use super::{
     DatasetError, ExportJob,
     csv_rows::CsvRows,
     depth::read_depth,
-    euroc::timing,
     flow::FlowPlane,
-    page::Page,
+    page::{Page, timing},
     run_folder::{RunCamera, RunFrame},
     twins::{TwinNeed, partners},
 };
@@ -51,7 +50,7 @@ pub(super) fn write_gopro(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetErr
             &format!("`{blurred}`"),
             "named as the encoding of the pictures has it: `blur_gamma` with sRGB, `blur` with linear values",
         );
-    job.target.text("README.md", page.text())?;
+    job.target.text("README.md", &page.ending(&[]))?;
     Ok(Vec::new())
 }
 
@@ -210,5 +209,5 @@ fn carla_page(job: &ExportJob<'_>) -> String {
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("shutter of cam{i}"), &timing(camera));
     }
-    page.text().to_owned()
+    page.ending(&[])
 }

@@ -8,8 +8,7 @@ use super::{
     DatasetError, ExportJob,
     axes::enu_from_camera,
     depth::DepthScale,
-    euroc::timing,
-    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    page::{MASK, OPTICAL, PIXEL_CENTRE_0, Page, WORLD, timing},
     pictures::{self, Samples},
     run_folder::{RunCamera, RunFrame},
     stamps::name_s,
@@ -95,7 +94,7 @@ fn write_camera(
 }
 
 /// `tx ty tz qx qy qz qw` of the optical axes in ENU.
-pub(super) fn pose_text(pose: &CameraPose) -> String {
+fn pose_text(pose: &CameraPose) -> String {
     let pose = enu_from_camera(pose);
     let values = pose.translation_m.to_array().into_iter().chain(xyzw(pose.rotation));
     values.map(|value| Number(value).to_string()).collect::<Vec<_>>().join(" ")
@@ -135,14 +134,11 @@ fn page(job: &ExportJob<'_>, scale: &DepthScale, notes: &[String]) -> String {
              delay is taken away, as the layout has no place for one. Names have ten digits before the point",
         )
         .line("`rgb`", Samples::Color.words())
-        .line("`mask.png`", "255 where the lens shows something, 0 elsewhere; without one it shows something everywhere");
+        .line("`mask.png`", MASK);
     for (i, camera) in job.run.cameras.iter().enumerate() {
         let i = if camera.name.is_empty() { String::new() } else { format!(" of cam{i}") };
         page.line(&format!("shutter{i}"), &timing(camera));
     }
     page.note("There is one pose for each picture. Pictures keep the lens; `calibration.txt` has it.");
-    notes.iter().for_each(|note| {
-        page.note(note);
-    });
-    page.text().to_owned()
+    page.ending(notes)
 }

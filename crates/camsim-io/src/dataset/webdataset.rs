@@ -10,8 +10,7 @@ use std::{
 use super::{
     DatasetError, ExportJob,
     axes::enu_from_camera,
-    euroc::timing,
-    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD},
+    page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD, timing},
     run_folder::{RunCamera, RunFrame},
     text::wxyz,
 };
@@ -218,5 +217,5 @@ fn page(job: &ExportJob<'_>) -> String {
     for (i, camera) in job.run.cameras.iter().enumerate() {
         page.line(&format!("shutter of cam{i}"), &timing(camera));
     }
-    page.text().to_owned()
+    page.ending(&[])
 }
