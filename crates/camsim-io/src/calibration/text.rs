@@ -2,7 +2,8 @@
 
 use glam::DQuat;
 
-/// A number with a decimal point and without an exponent, as OpenCV's and ORB-SLAM3's readers want reals.
+/// A number with a decimal point and without an exponent, as OpenCV's and ORB-SLAM3's readers want reals. YAML 1.1,
+/// which Kalibr's follows, takes `1e-5` for a text.
 pub(crate) fn real(value: f64) -> String {
     let text = format!("{value}");
     if text.contains('.') || !value.is_finite() { text } else { text + ".0" }

@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use camsim_core::scenario::{ImuSpec, TriadSpec};
 use serde::{Deserialize, Serialize};
 
+use crate::calibration::text::real;
+
 /// The four figures of Kalibr's noise model, in continuous time: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz), m/s^2/sqrt(Hz),
 /// m/s^3/sqrt(Hz).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,13 +43,6 @@ impl KalibrFigures {
     }
 }
 
-/// A number with a decimal point and without exponent: YAML 1.1, which Kalibr's parser follows, takes `1e-5`
-/// for a text.
-fn decimal(value: f64) -> String {
-    let text = value.to_string();
-    if text.contains('.') { text } else { text + ".0" }
-}
-
 /// Text of Kalibr's `imu.yaml`.
 #[must_use]
 pub fn kalibr_yaml(spec: &ImuSpec) -> String {
@@ -66,8 +61,8 @@ pub(crate) fn imu_yaml(figures: &KalibrFigures, topic: &str, rate_hz: f64) -> St
     ] {
         let zero = if value == 0.0 { "; 0 in truth, which Kalibr refuses" } else { "" };
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "{key}: {}   # {unit}{zero}", decimal(value.max(LEAST)));
+        let _ = writeln!(text, "{key}: {}   # {unit}{zero}", real(value.max(LEAST)));
     }
-    let _ = write!(text, "rostopic: /{topic}\nupdate_rate: {}\n", decimal(rate_hz));
+    let _ = write!(text, "rostopic: /{topic}\nupdate_rate: {}\n", real(rate_hz));
     text
 }
