@@ -63,6 +63,7 @@ pub mod write;
 
 #[cfg(test)]
 mod inputs_page;
+mod median;
 mod similar_file;
 mod unlikely_camera;
 mod wording;

@@ -10,8 +10,9 @@ use super::{
     columns::{AttitudeColumns, FieldSource, Frame},
     layout::TableLayout,
     rows::ParsedRows,
-    time_unit::{format_short, median},
+    time_unit::format_short,
 };
+use crate::median::median;
 
 /// Converts roll, pitch and yaw to degrees where the header names no unit.
 ///
@@ -162,7 +163,7 @@ pub(super) fn check_degrees(rows: &ParsedRows, layout: &TableLayout) -> Result<(
     let mut latitudes: Vec<f64> = column(0).map(f64::abs).filter(|value| *value > 0.0).collect();
     // Such degrees lie in the Gulf of Guinea, where no land is. Close to the equator they are a made-up
     // place.
-    let far_from_equator = median(&mut latitudes).is_some_and(|latitude| latitude > 0.05);
+    let far_from_equator = median(&mut latitudes, f64::total_cmp).is_some_and(|latitude| latitude > 0.05);
     if far_from_equator
         && column(0).all(|value| value.abs() <= FRAC_PI_2)
         && column(1).all(|value| value.abs() <= PI)

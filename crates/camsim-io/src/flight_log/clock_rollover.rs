@@ -4,6 +4,7 @@
 use camsim_core::flight_log::Note;
 
 use super::rows::ParsedRow;
+use crate::median::median;
 
 const DAY_NS: i128 = 86_400_000_000_000;
 const MINUTE_NS: i128 = 60_000_000_000;
@@ -26,8 +27,7 @@ pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, no
     let (Some(&min_ns), Some(&max_ns)) = (times_ns.iter().min(), times_ns.iter().max()) else { return };
     let mut steps_ns: Vec<i128> =
         times_ns.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0).collect();
-    steps_ns.sort_unstable();
-    let median_step_ns = steps_ns.get(steps_ns.len() / 2).copied().unwrap_or(0);
+    let median_step_ns = median(&mut steps_ns, Ord::cmp).unwrap_or(0);
     let max_step_ns = MINUTE_NS.max(20 * median_step_ns);
     let rolls_over = |before_ns: i128, after_ns: i128, period_ns: i128| {
         let step_ns = after_ns + period_ns - before_ns;

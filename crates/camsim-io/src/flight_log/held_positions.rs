@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use camsim_core::flight_log::Note;
 
 use super::{column_selection::push_warning, rows::ParsedRow, sparse_rows, time_unit::format_short};
+use crate::median::median;
 
 /// With fewer steps of the position than this it is not known whether they are regular.
 const MIN_RUNS: usize = 6;
@@ -21,8 +22,7 @@ pub(super) fn interpolate_held(rows: &mut Vec<ParsedRow>, is_geodetic: bool, not
     let time = |row: usize| rows[timed[row]].time.unwrap_or_default();
     let is_sorted = (1..timed.len()).all(|row| time(row - 1) < time(row));
     let mut steps_ns: Vec<i128> = runs.windows(2).map(|pair| time(pair[1].0) - time(pair[0].0)).collect();
-    steps_ns.sort_unstable();
-    let period_ns = steps_ns[steps_ns.len() / 2];
+    let period_ns = median(&mut steps_ns, Ord::cmp).unwrap_or(0);
     if !is_sorted || period_ns > MAX_PERIOD_NS || !attitudes_change(rows, &timed, &runs) {
         return;
     }
@@ -74,9 +74,7 @@ fn runs(rows: &[ParsedRow], timed: &[usize]) -> Vec<(usize, usize)> {
 fn regular_length(runs: &[(usize, usize)]) -> Option<usize> {
     let [_, inner @ .., _] = runs else { return None };
     let mut lengths: Vec<usize> = inner.iter().map(|(_, length)| *length).collect();
-    lengths.sort_unstable();
-    let usual =
-        lengths.get(lengths.len() / 2).copied().filter(|&usual| usual > 1 && runs.len() >= MIN_RUNS)?;
+    let usual = median(&mut lengths, Ord::cmp).filter(|&usual| usual > 1 && runs.len() >= MIN_RUNS)?;
     let regular =
         lengths.iter().filter(|length| length.abs_diff(usual) <= (usual / 3).min(usual - 1).max(1)).count();
     (regular * 10 >= lengths.len() * 9).then_some(usual)

@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use camsim_core::flight_log::Note;
 
 use super::rows::ParsedRow;
+use crate::median::median;
 
 const SECOND_NS: i128 = 1_000_000_000;
 
@@ -109,8 +110,7 @@ pub(super) fn interpolate(
 /// Steps above this are gaps: 1 s, or three usual steps.
 pub(super) fn gap_ns(times: &[i128]) -> i128 {
     let mut steps: Vec<i128> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_unstable();
-    steps.get(steps.len() / 2).map_or(SECOND_NS, |median| SECOND_NS.max(3 * median))
+    median(&mut steps, Ord::cmp).map_or(SECOND_NS, |usual| SECOND_NS.max(3 * usual))
 }
 
 fn unwrap_longitudes(knots: &mut [(i128, [f64; 3])]) {

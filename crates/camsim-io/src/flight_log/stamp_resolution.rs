@@ -3,6 +3,7 @@
 use camsim_core::flight_log::Note;
 
 use super::{column_selection::push_warning, rows::ParsedRow, time_unit::format_short};
+use crate::median::median;
 
 /// Consecutive rows of one stamp: indices of rows.
 struct Group {
@@ -23,8 +24,7 @@ pub(super) fn spread_equal_stamps(rows: &mut [ParsedRow], notes: &mut Vec<Note>)
         return;
     }
     let mut sizes: Vec<usize> = groups.iter().map(|group| group.rows.len()).collect();
-    sizes.sort_unstable();
-    let usual_size = sizes[sizes.len() / 2].max(1);
+    let usual_size = median(&mut sizes, Ord::cmp).unwrap_or(1);
     let times = at_equal_steps(&groups, resolution_ns).unwrap_or_else(|| {
         let usual_step_ns = resolution_ns / usual_size as i128;
         let mut times = Vec::new();

@@ -13,6 +13,7 @@ use super::{
     time_fields::{self, TimeFormat},
     units::{HOUR, MICROSECOND, MILLISECOND, MINUTE, NANOSECOND, SECOND, Unit},
 };
+use crate::median::median;
 
 /// The years 2000 to 2100, seconds since 1970.
 const THIS_CENTURY_S: std::ops::Range<f64> = 946e6..4_103e6;
@@ -275,7 +276,7 @@ fn motion(rows: &ParsedRows, layout: &TableLayout) -> Motion {
     let is_integer = rows.rows.iter().filter_map(|row| row.time).all(time_fields::is_integer);
     let mut steps: Vec<f64> =
         times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    let step = median(&mut steps);
+    let step = median(&mut steps, f64::total_cmp);
 
     let geodetic = layout.frame == Frame::Geodetic;
     // A latitude or longitude of exactly 0 is written by receivers without a fix.
@@ -291,9 +292,9 @@ fn motion(rows: &ParsedRows, layout: &TableLayout) -> Motion {
     // Spikes and gaps are left out of the mean speed.
     let mut distances: Vec<f64> =
         moves.iter().map(|(_, distance)| *distance).filter(|distance| *distance > 0.0).collect();
-    let median_distance = median(&mut distances).unwrap_or(0.0);
+    let median_distance = median(&mut distances, f64::total_cmp).unwrap_or(0.0);
     let mut move_steps: Vec<f64> = moves.iter().map(|(step, _)| *step).collect();
-    let median_step = median(&mut move_steps).unwrap_or(0.0);
+    let median_step = median(&mut move_steps, f64::total_cmp).unwrap_or(0.0);
     moves.retain(|(step, _)| *step <= 20.0 * median_step);
     let length: f64 = moves.iter().map(|(_, distance)| distance.min(20.0 * median_distance)).sum();
     let duration: f64 = moves.iter().map(|(step, _)| step).sum();
@@ -305,13 +306,4 @@ fn motion(rows: &ParsedRows, layout: &TableLayout) -> Motion {
 fn distance_m(a: [f64; 3], b: [f64; 3], geodetic: bool) -> f64 {
     let scale = if geodetic { [111_200.0, 111_200.0 * a[0].to_radians().cos(), 1.0] } else { [1.0; 3] };
     (0..3).map(|axis| ((b[axis] - a[axis]) * scale[axis]).powi(2)).sum::<f64>().sqrt()
-}
-
-/// The median; `None` of no values.
-pub(super) fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -10,6 +10,7 @@ use camsim_core::{
 };
 
 use super::LoadError;
+use crate::median::median;
 
 /// The sensors of a scenario on the tracked log.
 ///
@@ -104,8 +105,7 @@ fn median_acceleration_m_s2(scenario: &Scenario, log: &FlightLog, trajectory: &T
     let at = |k: u32| from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(INSTANTS);
     let mut all: Vec<f64> =
         (0..INSTANTS).map(|k| trajectory.state(at(k)).acceleration_ned_m_s2.length()).collect();
-    all.sort_unstable_by(f64::total_cmp);
-    Some(all[all.len() / 2])
+    median(&mut all, f64::total_cmp)
 }
 
 #[cfg(test)]

@@ -12,7 +12,10 @@ use super::{
     ExperimentReport, ReproduceError, Setup, Table,
     test_bench::{self, Motion, TARGET_M},
 };
-use crate::plot::{Plot, Series};
+use crate::{
+    plot::{Plot, Series},
+    timing::quantile,
+};
 
 /// Number of rounds; each renders a burst with every variant in turn.
 const ROUNDS: usize = 9;
@@ -81,7 +84,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
             variant.ms.push(1e3 * begin.elapsed().as_secs_f64() / BURST as f64);
         }
     }
-    let ms: Vec<f64> = variants.iter().map(|variant| median(variant.ms.clone())).collect();
+    let ms: Vec<f64> = variants.iter().map(|variant| quantile(&variant.ms, 0.5)).collect();
     report.notes.push(format!(
         "Renderer: {}. {}x{} pixels, read back, nothing encoded; medians of {} bursts of {BURST} frames, all \
          variants in turn. The paper: more than 33 frames/s with 100 samples on a GeForce 940MX. \"Reference \
@@ -154,9 +157,4 @@ fn render_burst(session: &mut Session<'_>, round: u64) -> Result<(), ReproduceEr
         std::hint::black_box(finished);
         Ok(())
     })?)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
