@@ -2,7 +2,10 @@
 
 use glam::DVec3;
 
-use crate::{row_time::WorldPoint, scene::Scene};
+use crate::{
+    row_time::{ImagePoint, WorldPoint},
+    scene::Scene,
+};
 
 /// A point that is tracked.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +27,17 @@ impl TrackPoint {
         let mesh = self.moves_with.and_then(|mesh| scene.meshes.get(mesh));
         WorldPoint::on(mesh.and_then(|mesh| mesh.motion.as_deref()), self.position_ned_m, 0.0)
     }
+}
+
+/// A point in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting {
+    /// Index of the point.
+    pub point: usize,
+    /// Where and when the frame shows it; within the picture.
+    pub seen: ImagePoint,
+    /// Whether nothing is in front of it, by a ray from the camera at that instant.
+    pub is_visible: bool,
 }
 
 /// At most `count` of `items`, evenly spaced in their order; the seed decides with which it begins.

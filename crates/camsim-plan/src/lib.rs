@@ -66,5 +66,5 @@ pub use ir::{
 };
 pub use planner::Planner;
 pub use source_error::pixel_truth::{FrameRays, PixelHit, PixelTruth, PixelWalk};
-pub use tracks::{Sighting, Tracks};
+pub use tracks::Tracks;
 pub use view::lens_reach::LensReach;

@@ -6,7 +6,10 @@ mod terrain_corners;
 mod vertices;
 mod views;
 
-use camsim_core::{row_time::ImagePoint, scenario::Channel, tracks::TrackPoint};
+use camsim_core::{
+    scenario::Channel,
+    tracks::{Sighting, TrackPoint},
+};
 use rayon::prelude::*;
 
 use crate::{ir::plan_error::PlanError, planner::Planner};
@@ -14,17 +17,6 @@ use hidden::is_hidden;
 
 /// Points that a thread takes at once.
 const POINTS_AT_ONCE: usize = 64;
-
-/// A point in a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sighting {
-    /// Index of the point.
-    pub point: usize,
-    /// Where and when the frame shows it; within the picture.
-    pub seen: ImagePoint,
-    /// Whether nothing is in front of it, by a ray from the camera at that instant.
-    pub is_visible: bool,
-}
 
 /// Points that are looked for in the frames of a sequence.
 #[derive(Debug)]

@@ -12,8 +12,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::tracks::TrackPoint;
-use camsim_plan::Sighting;
+use camsim_core::tracks::{Sighting, TrackPoint};
 
 use super::{Number, WriteError, atomic::write_atomic_with, numbers::push, write_atomic};
 

@@ -12,9 +12,9 @@ use camsim_core::{
         motion::{Between, Curve, Joint, JointFrame, Keys, Track},
     },
     sequence::Sequence,
-    tracks::TrackPoint,
+    tracks::{Sighting, TrackPoint},
 };
-use camsim_plan::{Planner, Sighting, Tracks};
+use camsim_plan::{Planner, Tracks};
 use glam::{DQuat, DVec2, DVec3};
 
 use super::fixtures::{Steady, block, hills, scenario, sequence, tangential};
