@@ -22,7 +22,10 @@ use camsim_core::{
 };
 use glam::DVec2;
 
-use crate::frame_file::{FrameFileError, exr_planes::read_exr};
+use crate::{
+    csv_table::{finite, open_table},
+    frame_file::{FrameFileError, exr_planes::read_exr},
+};
 
 /// Relative deviation of a node from a regular grid, in steps.
 const OFF_GRID: f64 = 1e-3;
@@ -115,11 +118,7 @@ fn csv_table(path: &Path, pixels: &Pixels) -> Result<LensGrid, LensTableError> {
         place: line.map_or(String::new(), |line| format!(", line {line}")),
         problem,
     };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| fail(None, error.to_string()))?;
+    let mut reader = open_table(path).map_err(|error| fail(None, error.to_string()))?;
     let header = reader.headers().map_err(|error| fail(None, error.to_string()))?.clone();
     let pair = |first: usize| {
         let names = [header.get(first)?, header.get(first + 1)?];
@@ -143,13 +142,7 @@ fn csv_table(path: &Path, pixels: &Pixels) -> Result<LensGrid, LensTableError> {
         let record =
             record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
         let line = record.position().map(csv::Position::line);
-        let number = |column: usize| {
-            let text = record.get(column).unwrap_or_default();
-            text.parse::<f64>()
-                .ok()
-                .filter(|value| value.is_finite())
-                .ok_or_else(|| fail(line, format!("`{text}` is no finite number")))
-        };
+        let number = |column: usize| finite(&record, column).map_err(|problem| fail(line, problem));
         let (a, b) = (DVec2::new(number(0)?, number(1)?), DVec2::new(number(2)?, number(3)?));
         nodes.push(match of {
             GridOf::Rays => (a, point(b)),

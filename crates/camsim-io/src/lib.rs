@@ -61,6 +61,7 @@ pub mod shell;
 pub mod terrain;
 pub mod write;
 
+mod csv_table;
 #[cfg(test)]
 mod inputs_page;
 mod median;

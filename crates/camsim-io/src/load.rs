@@ -30,6 +30,7 @@ mod far_models;
 mod motion;
 mod objects;
 mod optics;
+mod place_columns;
 mod placements;
 mod pose_table;
 mod scene;

@@ -9,6 +9,7 @@ use super::{
     FrameFileError, TrajectoryFormat,
     columns::{TableColumn, parse_column},
 };
+use crate::csv_table::open_table;
 
 /// Required columns, in the order of the slots of [`ColumnIndices`].
 const COLUMNS: [&str; 8] = ["t_s", "x", "y", "z", "qw", "qx", "qy", "qz"];
@@ -164,10 +165,8 @@ fn columns_of_header(header: &csv::StringRecord) -> Result<(ColumnIndices, Vec<S
 
 fn read_csv(path: &Path, base_s: f64) -> Result<(Vec<PoseRow>, Vec<String>), FrameFileError> {
     let fail = |line: Option<u64>, message: String| failure(path, line, message);
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).map_err(
-            |error| fail(None, format!("cannot be read: {error}; paths are relative to FRAME.toml")),
-        )?;
+    let mut reader = open_table(path)
+        .map_err(|error| fail(None, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
     let header = reader.headers().map_err(|error| fail(Some(1), error.to_string()))?.clone();
     // Columns are found by name, as the order of quaternions differs between programs.
     let (columns, unread) = columns_of_header(&header).map_err(|message| fail(Some(1), message))?;
@@ -180,7 +179,7 @@ fn read_csv(path: &Path, base_s: f64) -> Result<(Vec<PoseRow>, Vec<String>), Fra
         for (value, (index, factor)) in values.iter_mut().zip(columns) {
             let text = record.get(index).unwrap_or_default();
             let number: f64 = text.parse().map_err(|_| {
-                let name = header.get(index).unwrap_or_default().trim_start_matches('\u{feff}');
+                let name = header.get(index).unwrap_or_default();
                 fail(line, format!("{name} is `{text}`, which is no number"))
             })?;
             *value = factor * number;

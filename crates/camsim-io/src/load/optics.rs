@@ -7,7 +7,10 @@ use camsim_core::{
 };
 
 use super::LoadError;
-use crate::frame_file::columns::{TableColumn, parse_column};
+use crate::{
+    csv_table::open_table,
+    frame_file::columns::{TableColumn, parse_column},
+};
 
 /// A vignette whose largest value is below this may have fewer bits than it is stored in.
 const DIM_VIGNETTE: f32 = 0.5;
@@ -29,11 +32,7 @@ pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Ve
         line: line.map_or(String::new(), |line| format!(", line {line}")),
         problem,
     };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| fail(None, error.to_string()))?;
+    let mut reader = open_table(path).map_err(|error| fail(None, error.to_string()))?;
     let header = reader.headers().map_err(|error| fail(None, error.to_string()))?.clone();
     let (unit_s, has_columns) = match (header.get(0).map(parse_column), header.get(1), header.len()) {
         (Some(TableColumn::Time(Some(unit))), Some(zoom), 2) => {

@@ -2,15 +2,17 @@
 
 use std::path::Path;
 
-use camsim_core::scenario::PatternCentre;
-
-use super::LoadError;
+use super::{
+    LoadError,
+    place_columns::{NAMES, Place, PlaceColumns, check_names},
+};
+use crate::csv_table::{finite, open_table};
 
 /// Pose and scale of one copy of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
     /// Local position (north-east-down, metres), or latitude, longitude and height (degrees, metres).
-    pub position: (PatternCentre, Option<[f64; 3]>),
+    pub position: Place,
     /// Heading, added to that of the scenario.
     pub heading_deg: f64,
     /// Scale, multiplied by that of the scenario.
@@ -25,86 +27,49 @@ const COLUMNS: &str =
 ///
 /// # Errors
 /// The table cannot be read, lacks columns, or a value is out of range.
-// Long because the rules of header and rows share the columns.
 pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placement>, LoadError> {
     let fail = |problem: String| LoadError::Placements { path: path.into(), problem };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
+    let mut reader = open_table(path)
         .map_err(|error| fail(format!("cannot be read: {error}; check scene.gltf.placements")))?;
     let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
-    let known = ["n_m", "e_m", "d_m", "lat_deg", "lon_deg", "height_m", "heading_deg", "scale"];
-    if let Some(name) = header.iter().find(|name| !known.contains(&name.trim_start_matches('\u{feff}'))) {
-        return Err(fail(format!("line 1: the column `{name}` says nothing here; {COLUMNS}")));
-    }
-    if let Some(name) = known
-        .into_iter()
-        .find(|name| header.iter().filter(|cell| cell.trim_start_matches('\u{feff}') == *name).count() > 1)
-    {
-        return Err(fail(format!("line 1: there are two columns `{name}`; leave one out")));
-    }
-    let column = |name: &str| header.iter().position(|cell| cell.trim_start_matches('\u{feff}') == name);
-    let local = [column("n_m"), column("e_m"), column("d_m")];
-    let earth = [column("lat_deg"), column("lon_deg"), column("height_m")];
-    let is_complete = |columns: [Option<usize>; 3]| {
-        columns[0].is_some() && columns[1].is_some() && (columns[2].is_some() || on_ground)
-    };
-    let is_local = match (is_complete(local), is_complete(earth)) {
-        (true, false) => true,
-        (false, true) => false,
-        _ => {
-            let missing = [("d_m", local), ("height_m", earth)]
-                .into_iter()
-                .find(|(_, columns)| columns[0].is_some() && columns[1].is_some() && columns[2].is_none());
-            return Err(fail(match missing {
-                Some((name, _)) if !on_ground => {
-                    format!(
-                        "line 1: the column `{name}` is missing; give it, or set scene.gltf.on_ground = true \
-                            for what stands on the terrain"
-                    )
-                }
-                _ => format!("line 1: places are missing, or there are two kinds of them; {COLUMNS}"),
-            }));
-        }
-    };
+    let wrong = |problem: String| fail(format!("line 1: {problem}"));
+    check_names(&header, |name| ["heading_deg", "scale"].contains(&name), COLUMNS).map_err(wrong)?;
+    let places = PlaceColumns::of(&header, on_ground).ok_or_else(|| wrong(missing(&header, on_ground)))?;
+    let column = |name: &str| header.iter().position(|cell| cell == name);
     let mut placements = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| fail(error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: Option<usize>, default: f64| -> Result<f64, LoadError> {
-            let Some(column) = column else { return Ok(default) };
-            let text = record.get(column).unwrap_or_default();
-            let wrong = || fail(format!("line {line}: `{text}` is no finite number"));
-            text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(wrong)
+        let wrong = |problem: String| fail(format!("line {line}: {problem}"));
+        let number = |column: Option<usize>, default: f64| {
+            column.map_or(Ok(default), |column| finite(&record, column)).map_err(wrong)
         };
-        let triple = |columns: [Option<usize>; 3]| -> Result<[f64; 3], LoadError> {
-            Ok([number(columns[0], 0.0)?, number(columns[1], 0.0)?, number(columns[2], 0.0)?])
-        };
-        let position = match is_local {
-            true => (PatternCentre::Ned(triple(local)?), None),
-            false => (PatternCentre::Origin, Some(triple(earth)?)),
-        };
-        if let Some([lat_deg, lon_deg, _]) =
-            position.1.filter(|[lat_deg, lon_deg, _]| lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0)
-        {
-            return Err(fail(format!(
-                "line {line}: latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are \
-                    degrees, latitude -90 to 90"
-            )));
-        }
+        let position = places.read(&record).map_err(wrong)?;
         let scale = number(column("scale"), 1.0)?;
         if scale <= 0.0 {
-            return Err(fail(format!("line {line}: the scale is {scale}, not above 0")));
+            return Err(wrong(format!("the scale is {scale}, not above 0")));
         }
         placements.push(Placement { position, heading_deg: number(column("heading_deg"), 0.0)?, scale });
     }
     if placements.is_empty() { Err(fail("has no row: give a place a line".into())) } else { Ok(placements) }
 }
 
+/// What is wrong with the columns of places.
+fn missing(header: &csv::StringRecord, on_ground: bool) -> String {
+    let has = |name: &str| header.iter().any(|cell| cell == name);
+    match NAMES.into_iter().find(|[a, b, c]| !on_ground && has(a) && has(b) && !has(c)) {
+        Some([.., name]) => format!(
+            "the column `{name}` is missing; give it, or set scene.gltf.on_ground = true for what stands on the terrain"
+        ),
+        None => format!("places are missing, or there are two kinds of them; {COLUMNS}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+
+    use camsim_core::scenario::PatternCentre;
 
     use super::*;
 

@@ -2,14 +2,18 @@
 
 use std::path::Path;
 
-use camsim_core::{
-    flight_log::FlightLog,
-    scenario::{PatternCentre, Scenario},
-};
+use camsim_core::{flight_log::FlightLog, scenario::Scenario};
 use glam::{DQuat, DVec3, EulerRot};
 
-use super::{LoadError, scene::position_ned_m};
-use crate::frame_file::columns::{TableColumn, parse_column};
+use super::{
+    LoadError,
+    place_columns::{PlaceColumns, check_names},
+    scene::position_ned_m,
+};
+use crate::{
+    csv_table::{finite, open_table},
+    frame_file::columns::{TableColumn, parse_column},
+};
 
 /// Rows of a table of poses.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,8 +29,6 @@ pub(super) struct PoseTable {
 /// Columns of attitudes, of which a table has all of one line, or none.
 const ATTITUDES: [&[&str]; 3] =
     [&["heading_deg"], &["roll_deg", "pitch_deg", "yaw_deg"], &["qw", "qx", "qy", "qz"]];
-/// Columns of positions.
-const PLACES: [[&str; 3]; 2] = [["n_m", "e_m", "d_m"], ["lat_deg", "lon_deg", "height_m"]];
 /// Advice in messages about the header.
 const COLUMNS: &str = "give a header with t_s (or t_ms, t_us, t_ns), n_m,e_m,d_m or lat_deg,lon_deg,height_m \
                        and, if wanted, heading_deg, or roll_deg,pitch_deg,yaw_deg, or qw,qx,qy,qz";
@@ -35,8 +37,7 @@ const COLUMNS: &str = "give a header with t_s (or t_ms, t_us, t_ns), n_m,e_m,d_m
 struct Columns {
     time: usize,
     unit_s: f64,
-    is_local: bool,
-    place: [Option<usize>; 3],
+    place: PlaceColumns,
     /// Index in [`ATTITUDES`] and the columns.
     attitude: Option<(usize, Vec<usize>)>,
 }
@@ -53,10 +54,7 @@ pub(super) fn read_pose_table(
     on_ground: bool,
 ) -> Result<PoseTable, LoadError> {
     let fail = |problem: String| LoadError::Poses { path: path.into(), problem };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
+    let mut reader = open_table(path)
         .map_err(|error| fail(format!("cannot be read: {error}; check scene.gltf.motion.poses")))?;
     let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
     let columns = columns(&header, on_ground).map_err(|problem| fail(format!("line 1: {problem}")))?;
@@ -66,11 +64,7 @@ pub(super) fn read_pose_table(
         let record = record.map_err(|error| fail(error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
         let fail = |problem: String| fail(format!("line {line}: {problem}"));
-        let number = |column: usize| -> Result<f64, LoadError> {
-            let text = record.get(column).unwrap_or_default();
-            let wrong = || fail(format!("`{text}` is no finite number"));
-            text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(wrong)
-        };
+        let number = |column: usize| finite(&record, column).map_err(fail);
         let since_epoch_s = match record.get(columns.time).and_then(|text| text.parse::<i64>().ok()) {
             // Nanoseconds of a calendar clock have more digits than a float.
             Some(ns) if columns.unit_s == 1e-9 => ns.saturating_sub(log.epoch_ns) as f64 * 1e-9,
@@ -82,20 +76,7 @@ pub(super) fn read_pose_table(
                 "its time is not later than that of the row before: sort the rows by time".into(),
             ));
         }
-        let mut place = [0.0; 3];
-        for (value, column) in place.iter_mut().zip(columns.place) {
-            *value = column.map_or(Ok(0.0), number)?;
-        }
-        if !columns.is_local && (place[0].abs() > 90.0 || place[1].abs() > 360.0) {
-            return Err(fail(format!(
-                "latitude {}, longitude {} are no place on Earth; both are degrees, latitude -90 to 90",
-                place[0], place[1]
-            )));
-        }
-        let (local, geodetic) = match columns.is_local {
-            true => (PatternCentre::Ned(place), None),
-            false => (PatternCentre::Origin, Some(place)),
-        };
+        let (local, geodetic) = columns.place.read(&record).map_err(fail)?;
         table.times_s.push(t_s);
         table.positions_ned_m.push(position_ned_m(
             scenario,
@@ -115,20 +96,13 @@ pub(super) fn read_pose_table(
 }
 
 fn columns(header: &csv::StringRecord, on_ground: bool) -> Result<Columns, String> {
-    let names: Vec<&str> = header.iter().map(|cell| cell.trim_start_matches('\u{feff}')).collect();
-    let is_known = |name: &&str| {
+    let is_known = |name: &str| {
         matches!(parse_column(name), TableColumn::Time(Some(_)))
-            || ATTITUDES.iter().any(|names| names.contains(name))
-            || PLACES.iter().any(|names| names.contains(name))
+            || ATTITUDES.iter().any(|names| names.contains(&name))
     };
-    if let Some(name) = names.iter().find(|name| !is_known(name)) {
-        return Err(format!("the column `{name}` says nothing here; {COLUMNS}"));
-    }
-    if let Some(name) = names.iter().find(|name| names.iter().filter(|other| other == name).count() > 1) {
-        return Err(format!("there are two columns `{name}`; leave one out"));
-    }
-    let column = |name: &str| names.iter().position(|known| *known == name);
-    let mut times = names.iter().enumerate().filter_map(|(k, name)| match parse_column(name) {
+    check_names(header, is_known, COLUMNS)?;
+    let column = |name: &str| header.iter().position(|known| known == name);
+    let mut times = header.iter().enumerate().filter_map(|(k, name)| match parse_column(name) {
         TableColumn::Time(Some(unit)) => Some((k, unit.factor)),
         _ => None,
     });
@@ -136,20 +110,9 @@ fn columns(header: &csv::StringRecord, on_ground: bool) -> Result<Columns, Strin
         (Some(time), None) => time,
         _ => return Err(format!("one column of times is wanted; {COLUMNS}")),
     };
-    let places = PLACES.map(|names| names.map(column));
-    let is_whole = |place: &[Option<usize>; 3]| {
-        place[0].is_some() && place[1].is_some() && (place[2].is_some() || on_ground)
-    };
-    let is_begun = |place: &[Option<usize>; 3]| place.iter().any(Option::is_some);
-    let is_local = match (is_begun(&places[0]), is_begun(&places[1])) {
-        (true, false) if is_whole(&places[0]) => true,
-        (false, true) if is_whole(&places[1]) => false,
-        _ => {
-            return Err(format!(
-                "places are missing or not whole, or there are two kinds of them; {COLUMNS}"
-            ));
-        }
-    };
+    let place = PlaceColumns::of(header, on_ground).ok_or_else(|| {
+        format!("places are missing or not whole, or there are two kinds of them; {COLUMNS}")
+    })?;
     let begun: Vec<usize> = (0..ATTITUDES.len())
         .filter(|&kind| ATTITUDES[kind].iter().any(|name| column(name).is_some()))
         .collect();
@@ -162,7 +125,7 @@ fn columns(header: &csv::StringRecord, on_ground: bool) -> Result<Columns, Strin
         }
         _ => return Err(format!("there are two kinds of attitudes; {COLUMNS}")),
     };
-    Ok(Columns { time, unit_s, is_local, place: places[usize::from(!is_local)], attitude })
+    Ok(Columns { time, unit_s, place, attitude })
 }
 
 /// Rotation from body to NED of one of [`ATTITUDES`]; `None` if the numbers have none.
@@ -194,10 +157,13 @@ mod tests {
     #[test]
     fn columns_are_found_by_their_names() {
         let found = header("\u{feff}t_ns,yaw_deg,pitch_deg,roll_deg,e_m,n_m,d_m", false).unwrap();
-        assert_eq!((found.time, found.unit_s, found.is_local), (0, 1e-9, true));
-        assert_eq!((found.place, found.attitude), ([Some(5), Some(4), Some(6)], Some((1, vec![3, 2, 1]))));
+        assert_eq!((found.time, found.unit_s, found.place.is_local), (0, 1e-9, true));
+        assert_eq!(
+            (found.place.columns, found.attitude),
+            ([Some(5), Some(4), Some(6)], Some((1, vec![3, 2, 1])))
+        );
         let found = header("lat_deg,lon_deg,t_s", true).unwrap();
-        assert_eq!((found.is_local, found.place[2], found.attitude), (false, None, None));
+        assert_eq!((found.place.is_local, found.place.columns[2], found.attitude), (false, None, None));
         for (text, wanted) in [
             ("t_s,n_m,e_m", "places are missing"),
             ("n_m,e_m,d_m", "one column of times"),

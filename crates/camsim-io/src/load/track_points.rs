@@ -5,7 +5,7 @@ use std::path::Path;
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     geodesy::LocalFrame,
-    scenario::{PatternCentre, PointSource, Scenario},
+    scenario::{PointSource, Scenario},
     scene::ned_from_board,
     tracks::{TrackPoint, thinned},
 };
@@ -13,9 +13,10 @@ use glam::DVec3;
 
 use super::{
     LoadError, board_position_ned_m, height_conversions,
+    place_columns::{PlaceColumns, check_names},
     scene::{position_ned_m, undulation_m},
 };
-use crate::board_file::read_board;
+use crate::{board_file::read_board, csv_table::open_table};
 
 /// Advice in messages about the header.
 const COLUMNS: &str = "give a header with n_m,e_m,d_m or lat_deg,lon_deg,height_m and, if wanted, name";
@@ -84,43 +85,21 @@ fn read_points(
     log: &FlightLog,
 ) -> Result<Vec<TrackPoint>, LoadError> {
     let fail = |problem: String| LoadError::TrackPoints { path: path.into(), problem };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
+    let mut reader = open_table(path)
         .map_err(|error| fail(format!("cannot be read: {error}; check output.tracks.points")))?;
-    let header: Vec<String> = reader
-        .headers()
-        .map_err(|error| fail(error.to_string()))?
-        .iter()
-        .map(|cell| cell.trim_start_matches('\u{feff}').to_owned())
-        .collect();
-    let columns = Columns::of(&header).map_err(|problem| fail(format!("line 1: {problem}")))?;
+    let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
+    let wrong = |problem: String| fail(format!("line 1: {problem}"));
+    check_names(&header, |name| name == "name", COLUMNS).map_err(wrong)?;
+    let places = PlaceColumns::of(&header, false)
+        .ok_or_else(|| wrong(format!("positions are incomplete, or of two kinds; {COLUMNS}")))?;
+    let name_column = header.iter().position(|cell| cell == "name");
     let mut points = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| fail(error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let mut place = [0.0; 3];
-        for (value, column) in place.iter_mut().zip(columns.place) {
-            let text = record.get(column).unwrap_or_default();
-            *value = text
-                .parse()
-                .ok()
-                .filter(|value: &f64| value.is_finite())
-                .ok_or_else(|| fail(format!("line {line}: `{text}` is no finite number")))?;
-        }
-        let [lat_deg, lon_deg, _] = place;
-        if !columns.is_local && (lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0) {
-            return Err(fail(format!(
-                "line {line}: latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are degrees, \
-                 latitude -90 to 90"
-            )));
-        }
-        let (at, geodetic) = match columns.is_local {
-            true => (PatternCentre::Ned(place), None),
-            false => (PatternCentre::Origin, Some(place)),
-        };
-        let name = columns.name.and_then(|column| record.get(column)).unwrap_or_default();
+        let (at, geodetic) =
+            places.read(&record).map_err(|problem| fail(format!("line {line}: {problem}")))?;
+        let name = name_column.and_then(|column| record.get(column)).unwrap_or_default();
         points.push(TrackPoint {
             source: source.to_owned(),
             name: if name.is_empty() { points.len().to_string() } else { name.to_owned() },
@@ -129,40 +108,6 @@ fn read_points(
         });
     }
     if points.is_empty() { Err(fail("has no row: give each point a line".into())) } else { Ok(points) }
-}
-
-/// Columns of a table of points.
-struct Columns {
-    /// North, east, down, or latitude, longitude, height.
-    place: [usize; 3],
-    is_local: bool,
-    name: Option<usize>,
-}
-
-impl Columns {
-    fn of(header: &[String]) -> Result<Self, String> {
-        const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
-        const EARTH: [&str; 3] = ["lat_deg", "lon_deg", "height_m"];
-        let is_known = |name: &str| LOCAL.contains(&name) || EARTH.contains(&name) || name == "name";
-        if let Some(name) = header.iter().find(|name| !is_known(name)) {
-            return Err(format!("the column `{name}` says nothing here; {COLUMNS}"));
-        }
-        if let Some((_, name)) = header.iter().enumerate().find(|(i, name)| header[..*i].contains(name)) {
-            return Err(format!("there are two columns `{name}`; leave one out"));
-        }
-        let column = |name: &str| header.iter().position(|cell| cell == name);
-        let all = |names: [&str; 3]| {
-            let [a, b, c] = names.map(column);
-            Some([a?, b?, c?])
-        };
-        let some = |names: [&str; 3]| names.into_iter().any(|name| column(name).is_some());
-        let (place, is_local) = match (all(LOCAL), all(EARTH)) {
-            (Some(place), None) if !some(EARTH) => (place, true),
-            (None, Some(place)) if !some(LOCAL) => (place, false),
-            _ => return Err(format!("positions are incomplete, or of two kinds; {COLUMNS}")),
-        };
-        Ok(Self { place, is_local, name: column("name") })
-    }
 }
 
 #[cfg(test)]

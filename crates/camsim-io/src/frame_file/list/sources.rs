@@ -3,10 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use super::{FrameEntry, key_error};
-use crate::frame_file::{
-    FrameFileError, NameUnit,
-    columns::{TableColumn, parse_column},
-    poses::split_words,
+use crate::{
+    csv_table::open_table,
+    frame_file::{
+        FrameFileError, NameUnit,
+        columns::{TableColumn, parse_column},
+        poses::split_words,
+    },
 };
 
 /// A picture, with its time if it has one.
@@ -134,12 +137,10 @@ fn read_associations(path: &Path) -> Result<Vec<FrameEntry>, FrameFileError> {
 /// Index and unit of the time column of `frames.csv`; `None` if it has none.
 fn time_column(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, String> {
     // stamp_ns, as in tables that camsim wrote, takes precedence over other times.
-    if let Some(index) =
-        header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case("stamp_ns"))
-    {
+    if let Some(index) = header.iter().position(|cell| cell.eq_ignore_ascii_case("stamp_ns")) {
         return Ok(Some((index, NameUnit::Ns)));
     }
-    let is_time = |name: &str| name.trim_start_matches('\u{feff}').to_lowercase().starts_with('t');
+    let is_time = |name: &str| name.to_lowercase().starts_with('t');
     let times = header.iter().enumerate().filter(|(_, cell)| match parse_column(cell) {
         TableColumn::Time(_) => true,
         TableColumn::WrongUnit => is_time(cell),
@@ -169,17 +170,12 @@ fn time_column(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, 
 }
 
 fn read_csv(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileError> {
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).map_err(
-            |error| {
-                row_error(path, None, format!("cannot be read: {error}; paths are relative to FRAME.toml"))
-            },
-        )?;
+    let mut reader = open_table(path).map_err(|error| {
+        row_error(path, None, format!("cannot be read: {error}; paths are relative to FRAME.toml"))
+    })?;
     let header = reader.headers().map_err(|error| row_error(path, Some(1), error.to_string()))?.clone();
     let index_of = |names: &[&str]| {
-        names.iter().find_map(|name| {
-            header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
-        })
+        names.iter().find_map(|name| header.iter().position(|cell| cell.eq_ignore_ascii_case(name)))
     };
     let Some(color_index) = index_of(&["color", "color_exr", "color_png"]) else {
         return Err(row_error(
@@ -191,10 +187,7 @@ fn read_csv(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileErro
     };
     let depth_index = index_of(&["depth"]);
     let time_index = time_column(&header).map_err(|message| row_error(path, Some(1), message))?;
-    let is_repeated = |name: &str| {
-        header.iter().filter(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)).count()
-            > 1
-    };
+    let is_repeated = |name: &str| header.iter().filter(|cell| cell.eq_ignore_ascii_case(name)).count() > 1;
     if let Some(name) =
         ["color", "color_exr", "color_png", "depth", "stamp_ns"].into_iter().find(|name| is_repeated(name))
     {
@@ -222,7 +215,7 @@ fn read_csv(path: &Path) -> Result<(Vec<FrameEntry>, Vec<String>), FrameFileErro
 
 /// A note about the columns that are not read, unless camsim wrote the table. `read` are indices of columns.
 fn unread_columns_note(path: &Path, header: &csv::StringRecord, read: [Option<usize>; 3]) -> Vec<String> {
-    let is_named = |cell: &str, name: &str| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name);
+    let is_named = |cell: &str, name: &str| cell.eq_ignore_ascii_case(name);
     let index_of = |name: &str| header.iter().position(|cell| is_named(cell, name));
     let frame_index = index_of("frame");
     if frame_index.is_some() && index_of("stamp_ns").is_some() {
