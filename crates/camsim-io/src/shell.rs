@@ -13,3 +13,21 @@ pub fn quoted(word: impl AsRef<OsStr>) -> String {
         format!("'{}'", text.replace('\'', r"'\''"))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_a_shell_would_change_is_quoted() {
+        for (word, wanted) in [
+            ("flüge/a-1.toml", "flüge/a-1.toml"),
+            ("", "''"),
+            ("two words", "'two words'"),
+            ("it's", r"'it'\''s'"),
+            ("a|b*?<>~#`\\", r"'a|b*?<>~#`\'"),
+        ] {
+            assert_eq!(quoted(word), wanted);
+        }
+    }
+}

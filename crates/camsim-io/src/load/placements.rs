@@ -105,6 +105,7 @@ mod tests {
             ("lon_deg,lat_deg\n1,2\n", false, "line 1: the column `height_m` is missing"),
             ("n_m,d_m\n1,2\n", false, "line 1: places are missing"),
             ("n_m,e_m,lat_deg,lon_deg\n1,2,3,4\n", true, "two kinds"),
+            ("n_m,e_m,d_m,lat_deg\n1,2,3,4\n", false, "two kinds"),
             ("n_m,e_m,size\n1,2,3\n", true, "the column `size`"),
             ("n_m,e_m,d_m,n_m\n1,2,3,4\n", false, "line 1: there are two columns `n_m`"),
             (
