@@ -31,7 +31,8 @@ pub struct Delivery {
 impl Delivery {
     /// A frame of a sequence whose stamps begin at `epoch_ns`.
     pub fn new(finished: Finished, epoch_ns: i64) -> Self {
-        let source = SourceFrame::new(&finished.plan, epoch_ns);
+        let plan = &finished.plan;
+        let source = SourceFrame::new(plan.ideal_view(), plan.key_s, epoch_ns);
         Self { frame: finished.frame, source }
     }
 

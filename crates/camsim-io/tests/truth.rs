@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::{
-    reference::{IdealView, Oracle, RenderOptions},
+    reference::{Oracle, RenderOptions},
     scenario::Channel,
 };
 use camsim_io::{
@@ -40,11 +40,11 @@ fn source_coordinates_are_pixels_of_the_camera_in_frames_csv() {
     let planner = Planner::new(sequence.clone(), &CHANNELS, 16_384).unwrap();
     let oracle = Oracle::new(sequence.clone()).unwrap();
     let plan = planner.plan(7).unwrap();
-    let key = Some(IdealView { pose: plan.key_pose, ideal: plan.ideal });
+    let key = Some(plan.ideal_view());
     let options =
         RenderOptions { channels: CHANNELS.to_vec(), key, max_samples: 1, ..RenderOptions::default() };
     let frame = oracle.render(7, &options);
-    let source = SourceFrame::new(&plan, sequence.epoch_ns);
+    let source = SourceFrame::new(plan.ideal_view(), plan.key_s, sequence.epoch_ns);
     let (depths, coords) = (frame.depth_m.unwrap(), frame.coords.unwrap());
     let (mut ground, mut sky, mut none) = (0, 0, 0);
     for (i, [_, _, x, y, dt_s, n, e, d]) in coords.iter().map(|pixel| pixel.map(f64::from)).enumerate() {

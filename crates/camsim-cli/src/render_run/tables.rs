@@ -248,7 +248,7 @@ pub fn end_frames(
 
 /// The frame to which the source coordinates of a plan refer.
 pub fn source_frame(sequence: &Sequence, plan: &FramePlan) -> SourceFrame {
-    SourceFrame::new(plan, sequence.epoch_ns)
+    SourceFrame::new(plan.ideal_view(), plan.key_s, sequence.epoch_ns)
 }
 
 fn record(

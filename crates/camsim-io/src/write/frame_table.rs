@@ -5,8 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::{exposure::FrameExposure, geodesy::Geodetic, pose::CameraPose};
-use camsim_plan::FramePlan;
+use camsim_core::{exposure::FrameExposure, geodesy::Geodetic, pose::CameraPose, reference::IdealView};
 
 use super::{WriteError, numbers::push, write_atomic};
 use crate::columns::wxyz;
@@ -66,15 +65,15 @@ pub struct SourceFrame {
 }
 
 impl SourceFrame {
-    /// The camera of a plan's ideal frame; `epoch_ns` is the stamp at path time 0.
+    /// The camera of an ideal frame of the instant `key_s`; `epoch_ns` is the stamp at path time 0.
     #[must_use]
-    pub fn new(plan: &FramePlan, epoch_ns: i64) -> Self {
+    pub fn new(IdealView { pose, ideal }: IdealView, key_s: f64, epoch_ns: i64) -> Self {
         Self {
-            size_px: plan.ideal.size_px,
-            focal_px: plan.ideal.focal_px.to_array(),
-            principal_px: plan.ideal.principal_px.to_array(),
-            t_ns: epoch_ns.saturating_add((plan.key_s * 1e9).round() as i64),
-            pose: plan.key_pose,
+            size_px: ideal.size_px,
+            focal_px: ideal.focal_px.to_array(),
+            principal_px: ideal.principal_px.to_array(),
+            t_ns: epoch_ns.saturating_add((key_s * 1e9).round() as i64),
+            pose,
         }
     }
 }
