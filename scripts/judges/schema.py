@@ -8,6 +8,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
 
 TAPLO, TOMBI = (pathlib.Path(sys.executable).with_name(name) for name in ("taplo", "tombi"))
 WRONG = {
@@ -64,8 +65,13 @@ class Server:
         self.send({"method": "textDocument/didOpen", "params": {"textDocument": document}})
 
     def at(self, method: str, uri: str, line: int, character: int) -> object:
-        position = {"line": line, "character": character}
-        return self.ask(f"textDocument/{method}", {"textDocument": {"uri": uri}, "position": position})
+        """The answer for a position; the server may still be reading document and schema."""
+        params = {"textDocument": {"uri": uri}, "position": {"line": line, "character": character}}
+        for _ in range(50):
+            if answer := self.ask(f"textDocument/{method}", params):
+                return answer
+            time.sleep(0.2)
+        raise AssertionError(f"no {method} for {uri}")
 
 
 def labels(completions: object) -> list[str]:
