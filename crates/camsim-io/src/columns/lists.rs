@@ -1,4 +1,4 @@
-//! The lists. Names in files are those of former versions, whose readers go by them.
+//! The lists. Readers of the files go by the names: they stay.
 
 use camsim_core::{
     frame::RowRecord,
