@@ -385,7 +385,7 @@ pub struct QualitySpec {
         hint = "leave it out or write \"auto\" for the planner's choice"
     )]
     pub iterations: Auto<u32>,
-    /// Exposure samples per pixel of path, and of each pixel of the picture, at most. With
+    /// Largest number of exposure samples, per pixel of the motion's path and per pixel of the picture. With
     /// `preset = "paper"`, each pixel has exactly so many.
     #[key(
         step = 0.1,

@@ -149,6 +149,8 @@ pub enum ValueKind {
     NumberOrList,
     /// A list of any number of numbers.
     NumberList,
+    /// A list of any number of whole numbers from 0.
+    WholeList,
     /// A list of any number of lists of this many numbers.
     Points(usize),
     /// A path, resolved against the folder of the file that names it.

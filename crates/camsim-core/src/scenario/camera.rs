@@ -49,7 +49,7 @@ pub struct CameraSpec {
     #[key(unit = "px", step = 0.1, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub principal_point_px: Option<[f64; 2]>,
-    /// Frames a second.
+    /// Frames per second.
     #[key(
         default = 30.0,
         unit = "1/s",
@@ -58,7 +58,7 @@ pub struct CameraSpec {
         hint = "give frames per second, for example 30"
     )]
     pub fps: f64,
-    /// Fraction of a frame period added to every stamp.
+    /// Shift of every frame, its exposure and its stamp, as a fraction of the frame period.
     #[key(unit = "frames", step = 0.01)]
     pub phase: f64,
     /// Lead of the camera's clock over the platform's. It is added to every stamp that the camera writes;
@@ -312,7 +312,7 @@ pub struct ZoomSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ShutterSpec {
-    /// Age of the image centre at its stamp, -t_d.
+    /// Time from the mid-exposure of the image's centre to the stamp: the paper's -t_d.
     #[key(unit = "ms", step = 0.2, min = 0.0, hint = "it is the age of the image centre at its stamp")]
     pub delay_ms: f64,
     /// Rolling shutter: time from the first row to the last, t_r.
@@ -393,10 +393,10 @@ fn is_false(value: &bool) -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parity {
-    /// Rows 0, 2, 4, ...
+    /// The even rows: 0, 2, 4.
     #[default]
     Even,
-    /// Rows 1, 3, 5, ...
+    /// The odd rows: 1, 3, 5.
     Odd,
 }
 

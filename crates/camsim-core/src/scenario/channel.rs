@@ -38,7 +38,7 @@ pub enum Channel {
     /// Share of the pixel's area and exposure that its `object` has, 0 to 1; 0 without a ray.
     Coverage,
     /// Optical flow to frame i + `output.flow_step`, pixels: where that frame, at the time of its own rows,
-    /// shows the point that the pixel sees. With a state.
+    /// shows the point that the pixel sees. With a state: seen, hidden, outside, several times.
     Flow,
     /// Optical flow to frame i - `output.flow_step`, pixels, with a state.
     FlowBack,

@@ -20,7 +20,7 @@ pub struct ImageSensorSpec {
     #[key(unit = "e-", step = 10.0, above = 0.0, hint = "it is what white stands for", example = "8000.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_e: Option<f64>,
-    /// Illuminance of the scene, as of light of 555 nm, in place of `white_e`. It needs `f_number`,
+    /// Illuminance on the scene, in place of `white_e`; all light counts as 555 nm. It needs `f_number`,
     /// `pixel_um` and `quantum_efficiency`.
     #[key(unit = "lx", step = 10.0, above = 0.0, hint = "it is what white stands for", example = "20000.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -65,8 +65,8 @@ pub struct ImageSensorSpec {
     /// Whether electrons come at random (Poisson). Dark current is random, too.
     #[key(default = true)]
     pub shot_noise: bool,
-    /// Dark current at `dark_reference_c`. It doubles with every `dark_doubling_c` up to `temperature_c`.
-    /// Left out: 0.
+    /// Dark current at `dark_reference_c`. That at `temperature_c` is twice as large for each
+    /// `dark_doubling_c` above it. Left out: 0.
     #[key(unit = "e-/s", step = 0.1, min = 0.0, hint = "0 is none", example = "0.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dark_current_e_s: Option<f64>,
@@ -106,7 +106,8 @@ pub struct ImageSensorSpec {
     /// Share of the pixels whose dark current is much larger.
     #[key(step = 0.0001, min = 0.0, max = 1.0, hint = "it is a share of the pixels")]
     pub hot_pixels: f64,
-    /// Mean dark current of hot pixels at `dark_reference_c`. It is exponentially distributed.
+    /// Mean dark current of hot pixels at `dark_reference_c`. Their dark currents are exponentially
+    /// distributed about it.
     #[key(unit = "e-/s", step = 10.0, min = 0.0, hint = "0 is none")]
     pub hot_e_s: f64,
     /// Share of the pixels that always show the black level.
@@ -285,7 +286,7 @@ pub enum Demosaic {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, Words)]
 #[serde(rename_all = "lowercase")]
 pub enum Companding {
-    /// The upper bits.
+    /// The upper `bits` of the converter's `adc_bits`.
     #[default]
     None,
     /// Square root: shot noise has the same size everywhere.

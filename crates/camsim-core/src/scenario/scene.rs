@@ -227,11 +227,11 @@ pub struct BoardSpec {
     #[key(example = "\"chessboard\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<BoardKind>,
-    /// Number from left to right. Inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
+    /// Inner corners (chessboard), squares (ChArUco), circles or tags from left to right.
     #[key(step = 0.1, min = 1, max = 80, example = "9")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<u32>,
-    /// Number from top to bottom. Inner corners (chessboard), squares (ChArUco), otherwise circles or tags.
+    /// Inner corners (chessboard), squares (ChArUco), circles or tags from top to bottom.
     #[key(step = 0.1, min = 1, max = 80, example = "6")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rows: Option<u32>,

@@ -86,7 +86,7 @@ pub struct GnssSpec {
         names = "horizontal vertical"
     )]
     pub velocity_sigma_m_s: [f64; 2],
-    /// Intervals without a fix: begin and end of each, counted from the first row of the log.
+    /// Intervals without a fix: start and end of each, counted from the first good row of the log.
     #[key(unit = "s", example = "[[12.0, 15.0]]", names = "from to")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub dropouts_s: Vec<[f64; 2]>,
@@ -99,7 +99,7 @@ pub struct GnssSpec {
     /// Time from the instant of a fix until it is available (`t_available_ns`).
     #[key(unit = "ms", min = 0.0, hint = "it is the age of a fix when it arrives")]
     pub delay_ms: f64,
-    /// Added to every stamp.
+    /// Lead of the sensor's clock, which is added to every stamp.
     #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
@@ -146,7 +146,7 @@ pub struct BarometerSpec {
     /// Step of the output. 0 is none.
     #[key(unit = "Pa", step = 0.1, min = 0.0, hint = "0 is none")]
     pub quantisation_pa: f64,
-    /// Added to every stamp.
+    /// Lead of the sensor's clock, which is added to every stamp.
     #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
@@ -195,7 +195,7 @@ pub struct MagnetometerSpec {
     /// Largest output of each axis. 0 is no limit.
     #[key(unit = "uT", min = 0.0, hint = "0 is no limit")]
     pub range_ut: f64,
-    /// Added to every stamp.
+    /// Lead of the sensor's clock, which is added to every stamp.
     #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.

@@ -14,8 +14,8 @@ pub struct TimingSpec {
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "it is a standard deviation")]
     pub jitter_ms: f64,
-    /// Speed of the camera's clock over that of the platform's, from the start of the window on. Its offset
-    /// is `camera.clock_offset_ms`.
+    /// How much faster the camera's clock runs than the platform's, from the start of the window on. Its
+    /// offset is `camera.clock_offset_ms`.
     #[key(unit = "ppm", above = -MOST_DRIFT_PPM, below = MOST_DRIFT_PPM, hint = "20 is usual")]
     pub drift_ppm: f64,
     /// Largest delay of a trigger. Delays are random, evenly distributed from 0 to this.

@@ -22,7 +22,7 @@ pub struct TwinSpec {
     /// Name of the twin's folder, below that of the frames.
     #[key(required, example = "\"sharp\"")]
     pub name: String,
-    /// Exposure. `false`: an instant in its place, hence no motion blur.
+    /// Whether it has the exposure. `false`: an instant, hence no motion blur. Left out: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<bool>,
@@ -34,15 +34,16 @@ pub struct TwinSpec {
     #[key(example = "\"centre\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instant: Option<FlowInstant>,
-    /// Lens. `false`: a pinhole with the same focal length, principal point and size.
+    /// Whether it has the lens. `false`: a pinhole with the same focal length, principal point and size. Left
+    /// out: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens: Option<bool>,
-    /// Noise. `false`: none.
+    /// Whether it has the noise. Left out: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<bool>,
-    /// Vignette. `false`: none.
+    /// Whether it has the vignette. Left out: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignette: Option<bool>,
@@ -67,7 +68,7 @@ pub struct TwinSpec {
     #[key(example = "[\"color\"]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<Channel>>,
-    /// Point spread. `false`: none, and no glare.
+    /// Whether it has the point spread and the glare. Left out: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_spread: Option<bool>,

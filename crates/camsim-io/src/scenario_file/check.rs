@@ -183,6 +183,7 @@ fn type_problem(key: &str, kind: ValueKind, value: &Value) -> Option<String> {
             (number(value) || all(value, None, &number), "a number or a list of numbers".to_owned())
         }
         ValueKind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
+        ValueKind::WholeList => (all(value, None, &whole), "a list of whole numbers, 0 or more".to_owned()),
         ValueKind::Points(n) => (
             all(value, None, &|point| all(point, Some(n), &number)),
             format!("a list of lists of {n} numbers"),

@@ -145,6 +145,7 @@ fn errors_name_file_line_and_key() {
             "expected a number or \"field\", found \"feild\"; did you mean \"field\"?",
         ),
         ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
+        ("[camera.timing]\ndrop = [1.5]", "camera.timing.drop: expected a list of whole numbers, 0 or more"),
         (
             "[camera.sensor]\ngain = 1",
             "dir/s.toml:7: camera.sensor.gain: unknown key; did you mean `camera.sensor.gain_e_per_dn`?",

@@ -123,7 +123,7 @@ macro_rules! whole {
     ($($type:ty: $kind:expr;)*) => {$(
         impl Value for $type {
             const KIND: ValueKind = $kind;
-            const LIST: ValueKind = ValueKind::NumberList;
+            const LIST: ValueKind = ValueKind::WholeList;
             const OR_AUTO: ValueKind = ValueKind::CountOr(u32::MAX, AUTO);
 
             fn leaf(&self) -> Leaf<'_> {

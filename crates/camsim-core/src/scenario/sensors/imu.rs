@@ -44,7 +44,7 @@ pub struct ImuSpec {
     /// Error of the gyroscope by the specific force along each axis. A number, or one of each axis.
     #[key(unit = "(rad/s)/(m/s2)", step = 1e-6)]
     pub g_sensitivity: PerAxis,
-    /// Added to every stamp.
+    /// Lead of the sensor's clock, which is added to every stamp.
     #[key(unit = "ms", step = 0.1)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.

@@ -79,6 +79,7 @@ fn of_kind(field: &Field) -> Value {
         ValueKind::NumberOrNumbers(count) => either(number(), fixed(number(), count)),
         ValueKind::NumberOrList => either(number(), list(number())),
         ValueKind::NumberList => list(number()),
+        ValueKind::WholeList => list(limited("integer", field)),
         ValueKind::Points(count) => list(fixed(number(), count)),
         ValueKind::Flag => json!({ "type": "boolean" }),
         ValueKind::Path | ValueKind::Text => text,

@@ -12,19 +12,31 @@ const HEAD: &str = "\
 
 Made from the fields of the scenario by `CAMSIM_BLESS=1 cargo test --workspace --lib listing`. Lengths are metres and \
 angles radians, unless a key's name says otherwise. `camsim render --print-default` prints all keys as a file; \
-`camsim schema` prints their JSON schema for editors.
+`camsim schema` prints their JSON schema for editors. `camera` may also be the path of a CAMERA.toml. The unit x is a factor.
+";
+
+/// Keys that are no fields of a scenario.
+const FOOT: &str = "
+## `[[cameras]]`
+
+Several cameras on the platform, in place of `[camera]`: each has all of its keys, a required `name`, and may have a \
+`file` (a CAMERA.toml, whose keys those beside it replace). See [rigs](../guide/RIGS.md).
+
+## `[randomize]`
+
+Distributions of keys, from which variations are drawn. See [random scenarios](../guide/RANDOMIZE.md).
 ";
 
 pub fn page() -> String {
     let mut text = HEAD.to_owned();
+    text += "\n## The root\n";
     add_table(&mut text, Scenario::FIELDS, "", Scenario::ABOUT, "");
-    text
+    text + FOOT
 }
 
 fn add_table(text: &mut String, fields: &[Field], table: &str, about: &str, unit: &str) {
     let is_table = |field: &&Field| matches!(field.kind, ValueKind::Table | ValueKind::Tables);
-    let title = if table.is_empty() { "The root".to_owned() } else { format!("`{table}`") };
-    *text += &format!("\n## {title}\n\n{about}\n");
+    *text += &format!("\n{about}\n");
     if fields.iter().any(|field| !is_table(&field)) {
         *text += "\n| key | value | default | meaning |\n|---|---|---|---|\n";
     }
@@ -40,8 +52,9 @@ fn add_table(text: &mut String, fields: &[Field], table: &str, about: &str, unit
     }
     for field in fields.iter().filter(is_table) {
         let name = join(table, field.name);
-        let heading = if field.kind == ValueKind::Tables { format!("[{name}]") } else { name.clone() };
-        add_table(text, field.fields, &heading, field.about, field.unit);
+        let is_list = field.kind == ValueKind::Tables;
+        *text += &if is_list { format!("\n## `[[{name}]]`\n") } else { format!("\n## `[{name}]`\n") };
+        add_table(text, field.fields, &name, field.about, field.unit);
     }
 }
 
@@ -49,7 +62,7 @@ fn add_table(text: &mut String, fields: &[Field], table: &str, about: &str, unit
 fn words(field: &Field) -> String {
     let word = |word: &camsim_core::scenario::keys::Word| match word.about {
         "" => format!("`{}`", word.name),
-        about => format!("`{}`: {}", word.name, about.trim_end_matches('.').replace('|', "\\|")),
+        about => format!("`{}`: {}", word.name, about.strip_suffix('.').unwrap_or(about).replace('|', "\\|")),
     };
     match field.words {
         [] => String::new(),
@@ -65,9 +78,10 @@ fn value(field: &Field, table_unit: &str) -> String {
     };
     let interval = match field.interval() {
         interval if interval == "finite" => String::new(),
-        interval => {
-            format!(" {}", interval.trim_start_matches("a finite number").trim_start_matches(',').trim())
-        }
+        interval => match interval.strip_prefix("a finite number") {
+            Some(rest) => rest.to_owned(),
+            None => format!(", {interval}"),
+        },
     };
     let quoted =
         |words: &[&str]| words.iter().map(|word| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", ");
@@ -85,6 +99,7 @@ fn value(field: &Field, table_unit: &str) -> String {
         ValueKind::NumberOrNumbers(count) => format!("number, or {count} numbers{interval}"),
         ValueKind::NumberOrList => format!("number, or list of numbers{interval}"),
         ValueKind::NumberList => format!("list of numbers{interval}"),
+        ValueKind::WholeList => "list of whole numbers".to_owned(),
         ValueKind::Points(count) => format!("list of {count} numbers each{names}{interval}"),
         ValueKind::Flag => "`true` or `false`".to_owned(),
         ValueKind::Path => "path".to_owned(),

@@ -40,7 +40,7 @@ fn python_type(kind: ValueKind) -> String {
         ValueKind::Whole | ValueKind::Within(..) => "int".to_owned(),
         ValueKind::CountOr(_, names) => format!("int | {}", words(names)),
         ValueKind::Numbers(_) | ValueKind::NumberList => "Sequence[float]".to_owned(),
-        ValueKind::Counts(..) => "Sequence[int]".to_owned(),
+        ValueKind::Counts(..) | ValueKind::WholeList => "Sequence[int]".to_owned(),
         ValueKind::NumbersOr(_, word) => format!("Sequence[float] | {}", words(&[word])),
         ValueKind::NumberOrNumbers(_) | ValueKind::NumberOrList => "float | Sequence[float]".to_owned(),
         ValueKind::Points(_) => "Sequence[Sequence[float]]".to_owned(),

@@ -44,8 +44,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, facts: &Key, out: &mut 
         ValueKind::Numbers(count) => optional_numbers(ui, document, key, value, facts, count, false, out),
         ValueKind::Counts(count, _) => optional_numbers(ui, document, key, value, facts, count, true, out),
         ValueKind::NumbersOr(count, word) => numbers_or(ui, document, key, value, facts, count, word, out),
-        // Numbers of frames, which are whole.
-        ValueKind::NumberList if key.starts_with("camera.timing.") => as_written(ui, key, value, facts),
+        ValueKind::WholeList => as_written(ui, key, value, facts),
         ValueKind::NumberList => number_list(ui, document, key, value, facts, out),
         ValueKind::Paths if value.is_some_and(Value::is_array) => as_written(ui, key, value, facts),
         ValueKind::Path | ValueKind::Paths => path(ui, document, key, value),
