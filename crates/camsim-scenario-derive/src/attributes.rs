@@ -67,7 +67,6 @@ impl Serde {
 }
 
 /// `#[key(...)]` of a field, as expressions.
-#[derive(Debug)]
 pub struct Key {
     pub required: bool,
     pub default: Option<Expr>,
