@@ -64,6 +64,15 @@ pub struct Field {
 }
 
 impl Field {
+    /// The unit, within a table of a unit.
+    #[must_use]
+    pub fn unit_in(&self, table_unit: &str) -> Cow<'static, str> {
+        match self.unit.strip_prefix('U') {
+            Some(rest) => format!("{table_unit}{rest}").into(),
+            None => self.unit.into(),
+        }
+    }
+
     /// The first sentence of the description.
     #[must_use]
     pub fn summary(&self) -> &'static str {
@@ -104,11 +113,7 @@ fn add_keys(fields: &'static [Field], prefix: &str, table_unit: &str, keys: &mut
     for field in fields {
         let name = join(prefix, field.name);
         if field.kind != ValueKind::Table {
-            let unit = match field.unit.strip_prefix('U') {
-                Some(rest) => Cow::Owned(format!("{table_unit}{rest}")),
-                None => field.unit.into(),
-            };
-            keys.push(Key { name: name.clone(), field, unit });
+            keys.push(Key { name: name.clone(), field, unit: field.unit_in(table_unit) });
         }
         add_keys(field.fields, &name, field.unit, keys);
     }

@@ -72,10 +72,7 @@ fn words(field: &Field) -> String {
 
 /// The kind of a value, with its interval and unit.
 fn value(field: &Field, table_unit: &str) -> String {
-    let unit = match field.unit.strip_prefix('U') {
-        Some(rest) => format!("{table_unit}{rest}"),
-        None => field.unit.to_owned(),
-    };
+    let unit = field.unit_in(table_unit);
     let interval = match field.interval() {
         interval if interval == "finite" => String::new(),
         interval => match interval.strip_prefix("a finite number") {
