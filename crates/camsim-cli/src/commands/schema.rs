@@ -12,8 +12,9 @@ use crate::{
 
 /// Print the JSON schema of scenarios, by which editors complete and check keys
 ///
-/// Write `#:schema scenario.schema.json` as the first line of a scenario: Visual Studio Code (Even Better TOML), and every
-/// editor with the language server taplo, then complete keys and words, show what they mean, and mark mistakes.
+/// Write `#:schema ./scenario.schema.json` as the first line of a scenario: Visual Studio Code (Even Better TOML,
+/// Tombi) and editors with these language servers then complete keys and words, show what they mean, and mark
+/// mistakes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Example:

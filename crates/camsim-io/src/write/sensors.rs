@@ -105,8 +105,8 @@ pub fn write_sensors(folder: &Path, sensors: &Sensors) -> Result<SensorSummary, 
     Ok(summary)
 }
 
-/// Writes one table, row by row. `mark` gives a sample's time, and whether an axis is at the end of its range or there is
-/// no fix.
+/// Writes one table, row by row. `mark` gives a sample's time, and whether an axis is at the end of its range or
+/// there is no fix.
 fn write_table<R: TableRow>(
     folder: &Path,
     name: &str,

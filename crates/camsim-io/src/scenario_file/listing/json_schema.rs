@@ -66,7 +66,10 @@ fn property(field: &Field) -> Value {
 fn of_kind(field: &Field) -> Value {
     let (number, text) = (|| limited("number", field), json!({ "type": "string" }));
     let list = |items: Value| json!({ "type": "array", "items": items });
-    let fixed = |items: Value, count: usize| json!({ "type": "array", "items": items, "minItems": count, "maxItems": count });
+    let fixed = |items: Value, count: usize| {
+        let length = json!(count);
+        json!({ "type": "array", "items": items, "minItems": length, "maxItems": length })
+    };
     let either = |first: Value, second: Value| json!({ "anyOf": [first, second] });
     match field.kind {
         ValueKind::Number => number(),
