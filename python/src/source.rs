@@ -7,7 +7,10 @@ use std::{
 
 use camsim::{
     cli::frame_source::with_reference,
-    core::scenario::{Preset, Rig, Scenario as Keys},
+    core::{
+        scenario::{Preset, Rig, Scenario as Keys},
+        twin::scenario_of,
+    },
     io::scenario_file::{RandomScenario, ScenarioError, parse_random_scenario, read_random_scenario},
 };
 use pyo3::PyResult;
@@ -112,7 +115,7 @@ fn twin_of(keys: &Keys, name: &str, instant: Option<u32>) -> PyResult<Keys> {
             Some(count) => format!("twin {name:?} is a burst: the instant is 0 to {}", count - 1),
         }));
     }
-    keys.twin(twin, instant).or_input_error()
+    scenario_of(keys, twin, instant).or_input_error()
 }
 
 /// Whether a file is a `run.json`: no TOML file begins with a brace.

@@ -7,9 +7,10 @@ use camsim_core::{
     imaging::{ImageSensor, Optics},
     late_photometric::LatePhotometric,
     reference::{Oracle, RenderOptions},
-    scenario::{Auto, Preset, Primary, Scenario, Solver, validate},
+    scenario::{Auto, Preset, Primary, Scenario, Solver},
     scene::LodSelection,
     sequence::Sequence,
+    validate::validate,
 };
 use camsim_engine::{Engine, Finished, FrameTimes, Session, join_parts};
 use camsim_io::write::WriteError;

@@ -20,10 +20,9 @@ use crate::{
     frame::RenderedFrame,
     imaging::{ImageSensor, Optics},
     noise::{camera_seed, tail_table},
-    photometric::{Photometry, photometric},
+    photometric::{GrayImage, Photometry, photometric},
     scenario::{CameraSpec, Preset, Primary, Reset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
-    sequence::GrayImage,
     shutter::Shutter,
     temporal::{
         ColorImage, Footprint, InverseDepthImage, PathStage, Source, TapStage,

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use glam::{DVec2, DVec3};
 
 use crate::lens::{Lens, LensError, LensModel};
-use crate::scenario::CameraSpec;
+use crate::{scenario::CameraSpec, scenario::MAX_SIDE_PX};
 
 mod bulk;
 mod check;
@@ -22,14 +22,11 @@ pub use check::{LensCheck, fringes_px};
 pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 
-/// Largest width or height. GPUs of the last decade support 16384; twice that is a typing error.
-pub(crate) const MAX_SIZE_PX: u32 = 32_768;
-
 /// Invalid camera parameters.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
     /// Zero or too large size.
-    #[error("camera.size_px is [{0}, {1}]: both must be 1 to {MAX_SIZE_PX}")]
+    #[error("camera.size_px is [{0}, {1}]: both must be 1 to {MAX_SIDE_PX}")]
     Size(u32, u32),
     /// Zero, negative or non-finite focal length.
     #[error(
@@ -109,7 +106,7 @@ impl CameraModel {
     /// A camera from `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
     pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
         let kernel = spec.point_spread.as_ref().and_then(|spread| spread.kernel.as_ref());
-        if let Some(file) = kernel.filter(|file| file.kernel.is_none()) {
+        if let Some(file) = kernel.filter(|file| !file.is_read()) {
             return Err(CameraError::Kernel(file.path.clone()));
         }
         let lens = |reach, focal_px, principal_px| {
@@ -135,7 +132,7 @@ impl CameraModel {
         lens: impl FnOnce(f64, DVec2, DVec2) -> Result<Lens, LensError>,
     ) -> Result<Self, CameraError> {
         let [width, height] = size_px;
-        if width == 0 || height == 0 || width > MAX_SIZE_PX || height > MAX_SIZE_PX {
+        if width == 0 || height == 0 || width > MAX_SIDE_PX || height > MAX_SIDE_PX {
             return Err(CameraError::Size(width, height));
         }
         if !(fx.is_normal() && fy.is_normal() && fx > 0.0 && fy > 0.0) {

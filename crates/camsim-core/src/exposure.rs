@@ -1,18 +1,6 @@
-//! Exposure of each frame: that of the scenario, or one that follows the pictures before it
-//! (`[camera.auto_exposure]`).
-//!
-//! The controller never sees rendered pictures. It runs over the sequence from frame 0 with a meter of its own
-//! (`meter`), so that a frame's exposure is a function of the scenario and the frame number, whatever is
-//! rendered, in whichever order and by whom. Formulas: docs/theory/IMAGING.md.
+//! Exposure of each frame: that of the scenario, or one that follows the pictures before it.
 
-mod controller;
-mod meter;
-#[cfg(test)]
-mod tests;
-mod track;
-
-pub use controller::Controller;
-pub use track::{ExposureError, ExposureTrack};
+use std::fmt::Debug;
 
 /// Exposure of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,4 +19,10 @@ impl FrameExposure {
     pub fn fixed(time_s: f64) -> Self {
         Self { time_s, gain: 1.0, light: 1.0 }
     }
+}
+
+/// Exposures of the frames of a camera, where they follow the pictures.
+pub trait FrameExposures: Debug + Send + Sync {
+    /// Exposure of a frame of any number.
+    fn of(&self, frame: u64) -> FrameExposure;
 }

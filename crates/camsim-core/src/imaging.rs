@@ -32,7 +32,7 @@ use crate::{
 pub use draw::{Draws, LARGE_MEAN, two_words};
 pub use facts::{Fact, facts, with_facts};
 pub use levels::{SensorLevels, sensor_levels};
-pub use optics::{KernelError, KernelFile, LensTransfer, Optics, SpreadKernel};
+pub use optics::{KernelError, LensTransfer, Optics, SpreadKernel};
 
 use exposed::Exposed;
 pub(crate) use exposed::sensor_range;

@@ -35,7 +35,7 @@ impl LatePhotometric {
         let weights = |primary| sequence.light_weights(primary).unwrap_or_default();
         Some(Self {
             camera: camera.clone(),
-            seeds: [sequence.scenario.seed, sequence.scenario.noise_seed()],
+            seeds: [sequence.scenario.seed, sequence.noise_seed()],
             table: tail_table(),
             weights: [Primary::Red, Primary::Green, Primary::Blue].map(weights),
         })

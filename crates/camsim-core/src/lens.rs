@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3};
 
-use crate::scenario::{CameraSpec, Face};
+use crate::scenario::{CameraSpec, Face, LoadedFile};
 
 pub use crate::scenario::LensModel;
 
@@ -61,7 +61,7 @@ pub use radial::RadialLens;
 pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
 pub use scaled::ScaledLens;
 pub(crate) use scaled::largest_radius;
-pub use table::{GridOf, LensGrid, LensGridError, LensTable, RayChart};
+pub use table::{GridOf, LensGrid, LensGridError, RayChart};
 
 use facts::Shape;
 pub(crate) use fold::MAX_FIELD_RAD;
@@ -132,7 +132,7 @@ pub enum Lens {
 }
 
 impl Lens {
-    /// A lens from its model and coefficients in the order of [`LensModel::facts`]; trailing ones may be left
+    /// A lens from its model and coefficients in the order of [`ModelFacts::of`]; trailing ones may be left
     /// out.
     pub fn new(model: LensModel, coefficients: &[f64]) -> Result<Self, LensError> {
         Self::with_reach(model, coefficients, DEFAULT_REACH)
@@ -148,7 +148,7 @@ impl Lens {
         if let Some((index, &value)) = coefficients.iter().enumerate().find(|(_, k)| !k.is_finite()) {
             return Err(LensError::NotFinite { index, value });
         }
-        let facts = model.facts();
+        let facts = ModelFacts::of(model);
         let all = facts.complete(coefficients).ok_or_else(|| LensError::TooManyCoefficients {
             model: facts.name,
             max: facts.coefficients.len(),
@@ -186,9 +186,9 @@ impl Lens {
         coefficients: &[f64],
         reach: f64,
     ) -> Result<Self, LensError> {
-        let grid = spec.lens_table.as_ref().and_then(|table| table.grid.as_ref());
+        let grid = spec.lens_table.as_ref().and_then(LoadedFile::content::<LensGrid>);
         let whole = match grid.filter(|_| spec.lens.model == LensModel::Table) {
-            Some(grid) => Self::from_grid(grid),
+            Some(grid) => Self::from_grid(&grid),
             None => Self::with_reach(spec.lens.model, coefficients, reach)?,
         };
         let [width, height] = spec.size_px;

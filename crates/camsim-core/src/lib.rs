@@ -21,7 +21,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`scenario`] | the input of a run: all keys, with range checks |
+//! | [`scenario`], [`validate`] | the input of a run: all keys; the checks of their values |
+//! | [`resized`], [`twin`] | scenarios made from others: cameras that deliver a part of their picture, better cameras |
 //! | [`geodesy`], [`flight_log`] | WGS-84 and local frames; a log, cleaned |
 //! | [`tracker`], [`trajectory`], [`mount`], [`pose`] | from a log to the pose of the camera at any instant |
 //! | [`lens`], [`camera`], [`shutter`] | distortion and its inverse, intrinsics with zoom, exposure times of rows |
@@ -31,7 +32,7 @@
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
 //! | [`photometric`], [`vignetting`], [`noise`], [`late_photometric`] | vignette, gain, noise, saturation |
-//! | [`exposure`] | exposure time and gain of each frame |
+//! | [`exposure`], [`auto_exposure`] | exposure time and gain of each frame; exposures that follow the pictures |
 //! | [`imaging`] | the lens as a blur; the image sensor: electrons, digital numbers, mosaics |
 //! | [`mtf`] | transfer function of a picture, from a slanted edge |
 //! | [`distribution`] | drawn numbers of random scenarios |
@@ -58,7 +59,10 @@
 
 #![warn(missing_docs)]
 
+pub use camsim_scenario as scenario;
+
 pub mod apply;
+pub mod auto_exposure;
 pub mod camera;
 pub mod distribution;
 pub mod exposure;
@@ -75,8 +79,8 @@ pub mod noise;
 pub mod photometric;
 pub mod pose;
 pub mod reference;
+pub mod resized;
 pub mod row_time;
-pub mod scenario;
 pub mod scene;
 pub mod sensors;
 pub mod sequence;
@@ -89,4 +93,6 @@ pub mod tracker;
 pub mod tracks;
 pub mod trajectory;
 pub mod transfer;
+pub mod twin;
+pub mod validate;
 pub mod vignetting;

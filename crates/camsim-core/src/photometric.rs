@@ -7,8 +7,16 @@ use crate::{
     exposure::FrameExposure,
     noise::{NOISE_STREAM, normal4},
     scenario::{CameraSpec, FilesOfSpec, OutputEncoding},
-    sequence::GrayImage,
 };
+
+/// A single-channel image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrayImage {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// Row-major values.
+    pub values: Vec<f32>,
+}
 
 /// Numbers of the photometric stage of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

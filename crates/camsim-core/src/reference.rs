@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 use crate::{
     camera::{CameraError, CameraModel, ZoomTable},
     imaging::{ImageSensor, Optics},
-    lens::{DEFAULT_REACH, Lens},
+    lens::{DEFAULT_REACH, Lens, ModelFacts},
     pose::CameraPose,
     scenario::{CameraSpec, Primary},
     sequence::Sequence,
@@ -420,7 +420,7 @@ fn lens_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<LensInverse, CameraErr
     let principal_px =
         mix2(low.principal_point_px.unwrap_or(centre), high.principal_point_px.unwrap_or(centre));
     let count = low.coefficients.len().max(high.coefficients.len());
-    let coefficient = |of: &[f64], i: usize| camera.lens.model.facts().or_default(of, i);
+    let coefficient = |of: &[f64], i: usize| ModelFacts::of(camera.lens.model).or_default(of, i);
     let coefficients: Vec<f64> = (0..count)
         .map(|i| mix(coefficient(&low.coefficients, i), coefficient(&high.coefficients, i)))
         .collect();

@@ -14,6 +14,7 @@ use crate::{
     geodesy::LocalFrame,
     mount::MountError,
     scenario::{HeightReference, MountSpec, Scenario},
+    shutter::Shutter,
     trajectory::Trajectory,
 };
 
@@ -158,7 +159,7 @@ pub fn span_s(scenario: &Scenario, last_row_s: f64) -> [f64; 2] {
     let [from_s, to_s] =
         scenario.flight.window_s.map_or([0.0, last_row_s], |window| window.map(|t_s| t_s / speed));
     let phase_s = camera.phase / camera.fps;
-    let (first_s, last_s) = camera.longest_shutter().map_or((0.0, 0.0), |shutter| shutter.window_s());
+    let (first_s, last_s) = Shutter::longest_of(camera).map_or((0.0, 0.0), |shutter| shutter.window_s());
     let before_s = (phase_s + first_s).min(0.0);
     let late_s = camera.timing.as_ref().map_or(0.0, |timing| 1e-3 * timing.late_ms);
     let after_s = (phase_s + last_s + late_s).max(0.0);

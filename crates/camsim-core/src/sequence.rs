@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use crate::{
-    exposure::{ExposureTrack, FrameExposure},
+    exposure::{FrameExposure, FrameExposures},
     mount::CameraPath,
+    noise::camera_seed,
+    photometric::GrayImage,
     scenario::{Face, Primary, Reset, Scenario, TwinSpec},
     scene::Scene,
     shutter::{Shutter, ShutterError},
-    timing_faults::TimingFaults,
+    timing_faults::{TimingFaults, picture_of},
+    twin::scenario_of,
     vignetting::pixel_weights,
 };
 
@@ -34,17 +37,17 @@ pub struct Sequence {
     /// `(t_s, zoom)` rows by path time.
     pub zoom_track: Vec<(f64, f64)>,
     /// Exposures of the frames, where they follow the pictures. Twins and faces have those of their camera.
-    pub exposures: Option<Arc<ExposureTrack>>,
+    pub exposures: Option<Arc<dyn FrameExposures>>,
 }
 
 impl Sequence {
-    /// The sequence of a twin's pictures, as [`Scenario::twin`]: of the same path and scene, with the same
+    /// The sequence of a twin's pictures, as [`scenario_of`]: of the same path and scene, with the same
     /// frame numbers.
     ///
     /// # Errors
     /// A shutter that cannot be used.
     pub fn twin(&self, twin: &TwinSpec, instant: Option<u32>) -> Result<Self, ShutterError> {
-        let scenario = self.scenario.twin(twin, instant)?;
+        let scenario = scenario_of(&self.scenario, twin, instant)?;
         let has_vignette = scenario.camera.photometric.vignette.is_some();
         let vignette = self.vignette.clone().filter(|_| has_vignette);
         Ok(Self { scenario, vignette, ..self.clone() })
@@ -101,10 +104,22 @@ impl Sequence {
         self.timing_faults().is_none_or(|faults| !faults.is_lost(frame))
     }
 
+    /// Number of the frame whose picture a frame shows: its own, but for doubled frames.
+    #[must_use]
+    pub fn picture(&self, frame: u64) -> u64 {
+        picture_of(&self.scenario.camera, self.scenario.seed, frame)
+    }
+
+    /// Seed of the camera's noise, from the scenario's seed and the camera's name.
+    #[must_use]
+    pub fn noise_seed(&self) -> u64 {
+        camera_seed(self.scenario.seed, &self.scenario.camera.name)
+    }
+
     /// Exposure of a frame, if it follows the pictures; else it is the scenario's.
     #[must_use]
     pub fn exposure(&self, frame: u64) -> Option<FrameExposure> {
-        self.exposures.as_ref().map(|track| track.of(self.scenario.picture(frame)))
+        self.exposures.as_ref().map(|track| track.of(self.picture(frame)))
     }
 
     /// Time for which each row of a frame is exposed to motion, seconds: 0 where pictures are of one instant,
@@ -113,7 +128,7 @@ impl Sequence {
     pub fn blurred_s(&self, frame: u64) -> f64 {
         let nominal_s = 1e-3 * self.scenario.camera.shutter.exposure_ms;
         let own = self.exposures.as_ref().filter(|_| nominal_s > 0.0);
-        own.map_or(nominal_s, |track| track.of(self.scenario.picture(frame)).time_s)
+        own.map_or(nominal_s, |track| track.of(self.picture(frame)).time_s)
     }
 
     /// Time of the platform's clock at path time 0, nanoseconds: that of trajectories.
@@ -157,13 +172,4 @@ impl Sequence {
         let differs = camera.shutter.reset == Reset::Global && camera.sensor.is_none();
         differs.then(|| Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).ok()).flatten()
     }
-}
-
-/// A single-channel image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GrayImage {
-    /// Width, height.
-    pub size_px: [u32; 2],
-    /// Row-major values.
-    pub values: Vec<f32>,
 }

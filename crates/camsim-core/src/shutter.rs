@@ -17,7 +17,7 @@
 //! `t_e + (share - first share) t_r`, where the share of a row is the factor of `t_r` above, and mid-exposures
 //! are half as far apart: `dt = -delay + share t_r/2`.
 
-use crate::scenario::{FieldOr, FlowInstant, Parity, Readout, Reset, ShutterSpec};
+use crate::scenario::{CameraSpec, FieldOr, FlowInstant, Parity, Readout, Reset, ShutterSpec};
 
 /// Invalid values in `[camera.shutter]`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,6 +64,16 @@ pub struct Shutter {
 }
 
 impl Shutter {
+    /// The shutter of a camera with the longest exposure that a frame may have.
+    ///
+    /// # Errors
+    /// A shutter that cannot be used.
+    pub fn longest_of(camera: &CameraSpec) -> Result<Self, ShutterError> {
+        let shutter = Self::from_spec(&camera.shutter, camera.fps, camera.size_px)?;
+        let auto = camera.auto_exposure.as_ref().filter(|_| shutter.exposure_s() > 0.0);
+        Ok(auto.map_or(shutter, |auto| shutter.with_exposure_s(1e-3 * auto.exposure_ms[1])))
+    }
+
     /// Timing from `[camera.shutter]`. N is the height or the width of the image, by the readout direction.
     pub fn from_spec(spec: &ShutterSpec, fps: f64, size_px: [u32; 2]) -> Result<Self, ShutterError> {
         if !(fps.is_normal() && fps > 0.0) {

@@ -6,7 +6,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::camera::CameraModel;
+use crate::{camera::CameraModel, scenario::MAX_KEY_FRAMES};
 
 pub mod displacement;
 pub mod edge_lines;
@@ -25,7 +25,7 @@ pub use multisample::{SAMPLE_POSITIONS, SAMPLES, resolve_depth};
 pub use stages::{NodeDepths, PathStage};
 
 /// Largest number of ideal frames of one output frame.
-pub const MAX_KEYS: u32 = 4;
+pub const MAX_KEYS: u32 = MAX_KEY_FRAMES;
 
 /// Geometry of an ideal frame: a pinhole camera at the key instant, off-axis, with no more pixels than the
 /// output frame needs.

@@ -5,9 +5,8 @@ use rayon::prelude::*;
 
 use crate::{
     camera::CameraModel,
-    photometric::vignette_weights,
+    photometric::{GrayImage, vignette_weights},
     scenario::{CameraSpec, Primary, VignettingSpec},
-    sequence::GrayImage,
 };
 
 /// Weight of a pixel by the model: `cos(angle off axis)^cos_power` times the polynomial of a primary; 0 without a

@@ -21,8 +21,6 @@ use camsim_plan::{FramePlan, PlanError, Planner, PrefilterTaps};
 
 use camsim_plan::uniforms::base_ned_m;
 
-use crate::session::ms_since;
-
 /// Most frames that are prepared ahead, one per thread, if each is planned alone: a few megabytes of
 /// triangles and poses. Frames of a group share an ideal frame; of them [`Planner::groups_at_once`] groups
 /// are prepared.
@@ -210,4 +208,8 @@ fn wait<T>(receiver: &Receiver<T>) -> Option<T> {
             Err(TryRecvError::Empty) => return receiver.recv().ok(),
         }
     }
+}
+
+pub(crate) fn ms_since(begin: Instant) -> f64 {
+    begin.elapsed().as_secs_f64() * 1e3
 }

@@ -27,7 +27,7 @@ use crate::{
     lane::{IdealCache, IdealKey, Lane, add_part, in_whole_camera, joined},
     moving::{Lamps, MovingScene},
     planner_threads,
-    prepare_ahead::{Job, PrepareAhead, Prepared, Preparer},
+    prepare_ahead::{Job, PrepareAhead, Prepared, Preparer, ms_since},
     truth::{FramePixels, hits, planes},
 };
 
@@ -261,7 +261,7 @@ impl<'a> Session<'a> {
         let planner = self.planner.lane(job.lane);
         let lane = &mut self.lanes[job.lane];
         let sequence = planner.sequence().clone();
-        let uniforms = frame_uniforms(plan, &sequence.scenario, self.coords_phase);
+        let uniforms = frame_uniforms(plan, &sequence, self.coords_phase);
         let key = IdealKey {
             poses: plan.key_poses(),
             ideal: plan.ideal,
@@ -530,8 +530,4 @@ impl Parts {
 /// Whether it is a pass that red or blue has beside that of green.
 fn is_beside_green(plan: &FramePlan) -> bool {
     matches!(plan.primary, Some(Primary::Red | Primary::Blue))
-}
-
-pub(crate) fn ms_since(begin: Instant) -> f64 {
-    begin.elapsed().as_secs_f64() * 1e3
 }

@@ -5,7 +5,7 @@ mod common;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    exposure::ExposureTrack,
+    auto_exposure::ExposureTrack,
     frame::RenderedFrame,
     reference::{Oracle, RenderOptions},
     scenario::{AutoExposureSpec, Channel, ImageSensorSpec, Mosaic},
@@ -48,7 +48,7 @@ fn flight(sensor: Option<ImageSensorSpec>) -> Arc<Sequence> {
     scenario.camera.auto_exposure =
         Some(AutoExposureSpec { target: 0.25, speed: 0.5, exposure_ms: [0.5, 38.0], ..Default::default() });
     let sequence = sequence(scenario, steady(150.0, 0.0, DVec3::new(60.0, 0.0, 0.0), DVec3::ZERO), ground());
-    let exposures = ExposureTrack::new(&sequence).expect("a camera").map(Arc::new);
+    let exposures = ExposureTrack::new(&sequence).expect("a camera").map(|track| Arc::new(track) as _);
     Arc::new(Sequence { exposures, ..Sequence::clone(&sequence) })
 }
 

@@ -288,7 +288,7 @@ fn luminance_and_colored_gains_are_those_of_all_colors() {
         });
     });
     let table = tail_table();
-    let (seed, number) = (grey_of.scenario.noise_seed(), FRAME as u32);
+    let (seed, number) = (grey_of.noise_seed(), FRAME as u32);
     let mut squares = [0.0; 2];
     for (i, pixel) in (0..160 * 120).map(|i| (i as usize, [i % 160, i / 160])) {
         let [plain, grey, colored] =

@@ -2,12 +2,12 @@
 
 mod common;
 
-use std::{convert::Infallible, sync::Arc};
+use std::convert::Infallible;
 
 use camsim_core::{
-    lens::{GridOf, Lens, LensGrid, LensModel, LensTable, RayChart},
+    lens::{GridOf, Lens, LensGrid, LensModel, ModelFacts, RayChart},
     reference::{Oracle, RenderOptions},
-    scenario::{Channel, LensSpec, MountSpec, Scenario},
+    scenario::{Channel, LensSpec, LoadedFile, MountSpec, Scenario},
 };
 use camsim_engine::Engine;
 use common::{city, rolling, scenario, sequence, steady};
@@ -44,7 +44,7 @@ fn lenses() -> [(LensModel, &'static [f64], f64); 13] {
 }
 
 /// A wavy lens that no formula here has.
-fn table() -> LensTable {
+fn table() -> LoadedFile {
     let wave = |at: f64| 0.01 * (7.0 * at).sin();
     let base = Lens::new(LensModel::BrownConrady, &[-0.2, 0.03]).expect("a lens");
     let values: Vec<DVec2> = (0..65 * 65)
@@ -55,7 +55,7 @@ fn table() -> LensTable {
         .collect();
     let placement = [DVec2::splat(-1.0), DVec2::splat(1.0 / 32.0)];
     let grid = LensGrid::new(RayChart::Ideal, GridOf::Rays, placement, [65; 2], &values).expect("a lens");
-    LensTable { path: "wavy.csv".into(), grid: Some(Arc::new(grid)) }
+    LoadedFile::new("wavy.csv", grid)
 }
 
 fn camera(model: LensModel, coefficients: &[f64], focal_px: f64) -> Scenario {
@@ -95,7 +95,7 @@ fn every_model_shows_what_the_reference_renderer_shows() {
             .flat_map(|(a, b)| (0..3).map(|i| f64::from(a[i] - b[i]).powi(2)))
             .sum();
         let psnr_db = -10.0 * (squares / (3 * both) as f64).log10();
-        let name = model.facts().name;
+        let name = ModelFacts::of(model).name;
         eprintln!("{name}: {psnr_db:.1} dB over {both} pixels, {differ} valid in one alone");
         assert!(both > 18_000 && differ <= 3, "{name}: {both} pixels, {differ} valid in one alone");
         assert!(psnr_db > LEAST_PSNR_DB, "{name}: {psnr_db:.1} dB");

@@ -6,8 +6,9 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
+    photometric::GrayImage,
     scenario::{Channel, LensModel, LensSpec, PointSpreadSpec, Preset, ShutterSpec},
-    sequence::{GrayImage, Sequence},
+    sequence::Sequence,
 };
 use camsim_engine::Session;
 use common::{city, engine, pattern, render, scenario, sequence, steady};

@@ -6,11 +6,12 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
+    photometric::GrayImage,
     scenario::{
         BurstOver, Channel, FieldOr, FlowInstant, FlowState, LensModel, LensSpec, ShutterSpec, TwinShutter,
         TwinSpec,
     },
-    sequence::{GrayImage, Sequence},
+    sequence::Sequence,
 };
 use camsim_engine::Engine;
 use common::{pattern, render, scenario, sequence, steady};

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use camsim_core::scene::{TILE_SIDE, Terrain, TerrainTiles, TexelForm, TileSource, tile_bytes};
+use camsim_core::scene::{Encoding, TILE_SIDE, Terrain, TerrainTiles, TexelForm, TileSource, tile_bytes};
 
-use crate::{adapter::GpuError, context::GpuContext, recorder::Recorder, upload::texture_format};
+use crate::{adapter::GpuError, context::GpuContext, recorder::Recorder};
 
 /// Tiles along a side of an array layer, as in shaders/ideal/texture/tiled.wgsl.
 const TILES_PER_SIDE: u32 = 8;
@@ -200,5 +200,14 @@ impl TilePool {
     /// Uploads the page table to a buffer of [`TilePool::table_bytes`].
     pub(crate) fn write_table(&self, recorder: &mut Recorder<'_>, to: &wgpu::Buffer) {
         recorder.write(to, 0, bytemuck::cast_slice(&self.table));
+    }
+}
+
+/// Format of a texture on the GPU.
+pub(crate) fn texture_format(encoding: Encoding, form: TexelForm) -> wgpu::TextureFormat {
+    match (form, encoding) {
+        (TexelForm::Light, _) => wgpu::TextureFormat::Rgba16Float,
+        (TexelForm::Stored, Encoding::Srgb) => wgpu::TextureFormat::Rgba8UnormSrgb,
+        (TexelForm::Stored, Encoding::Linear) => wgpu::TextureFormat::Rgba8Unorm,
     }
 }

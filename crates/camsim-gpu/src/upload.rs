@@ -10,7 +10,7 @@ use crate::{
     adapter::GpuError,
     context::GpuContext,
     layout::{MeshMaterial, MeshVertexData},
-    tiles::TilePool,
+    tiles::{TilePool, texture_format},
 };
 
 /// GPU resources of a scene.
@@ -212,15 +212,6 @@ fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
             lit: light.is_some(),
             blends: material.blends,
         },
-    }
-}
-
-/// Format of a texture on the GPU.
-pub(crate) fn texture_format(encoding: Encoding, form: TexelForm) -> wgpu::TextureFormat {
-    match (form, encoding) {
-        (TexelForm::Light, _) => wgpu::TextureFormat::Rgba16Float,
-        (TexelForm::Stored, Encoding::Srgb) => wgpu::TextureFormat::Rgba8UnormSrgb,
-        (TexelForm::Stored, Encoding::Linear) => wgpu::TextureFormat::Rgba8Unorm,
     }
 }
 

@@ -6,8 +6,8 @@
 
 use std::path::{Path, PathBuf};
 
-use camsim_core::camera::CameraModel;
-use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
+use camsim_core::scenario::{CameraSpec, LensModel};
+use camsim_core::{camera::CameraModel, validate::validate_camera};
 
 use crate::kernel_file::{KernelFileError, load_kernel};
 use crate::lens_table::{LensTableError, load_lens_table};

@@ -3,11 +3,11 @@
 //! A PNG or TIFF has its values as they are, without a transfer function; grey, or red, green and blue. An
 //! EXR has the channels Y, or R, G and B. A CSV has a row of numbers for each row of pixels.
 
-use std::{path::Path, path::PathBuf, sync::Arc};
+use std::path::{Path, PathBuf};
 
 use camsim_core::{
     imaging::{KernelError, SpreadKernel},
-    scenario::CameraSpec,
+    scenario::{CameraSpec, LoadedFile},
 };
 
 use crate::{
@@ -47,8 +47,8 @@ pub enum KernelFileError {
 /// The file cannot be read or holds no kernel.
 pub fn load_kernel(camera: &mut CameraSpec) -> Result<(), KernelFileError> {
     let file = camera.point_spread.as_mut().and_then(|spread| spread.kernel.as_mut());
-    if let Some(file) = file.filter(|file| file.kernel.is_none()) {
-        file.kernel = Some(Arc::new(read_kernel(&file.path)?));
+    if let Some(file) = file.filter(|file| !file.is_read()) {
+        *file = LoadedFile::new(&file.path, read_kernel(&file.path)?);
     }
     Ok(())
 }

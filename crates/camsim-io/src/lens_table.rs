@@ -13,12 +13,11 @@
 //! principal point shows what it sees, in shares of width and height from the lower left corner.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use camsim_core::{
     camera::CameraModel,
     lens::{GridOf, LensGrid, LensGridError, LensModel, RayChart},
-    scenario::{CameraSpec, FilesOfSpec},
+    scenario::{CameraSpec, FilesOfSpec, LoadedFile},
 };
 use glam::DVec2;
 
@@ -62,15 +61,13 @@ pub enum LensTableError {
 /// The file cannot be read or holds no lens.
 pub fn load_lens_table(camera: &mut CameraSpec) -> Result<(), LensTableError> {
     let path = match &camera.lens_table {
-        Some(table) if table.grid.is_none() && camera.lens.model == LensModel::Table => table.path.clone(),
+        Some(table) if !table.is_read() && camera.lens.model == LensModel::Table => table.path.clone(),
         _ => return Ok(()),
     };
     let is_picture = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
     let pixels = Pixels::new(camera);
     let grid = if is_picture { st_map(&path, &pixels)? } else { csv_table(&path, &pixels)? };
-    if let Some(table) = &mut camera.lens_table {
-        table.grid = Some(Arc::new(grid));
-    }
+    camera.lens_table = Some(LoadedFile::new(path, grid));
     Ok(())
 }
 
@@ -261,8 +258,9 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use camsim_core::{
-        lens::LensTable,
-        scenario::{Binning, LensSpec, ResizedSpec, Resizing, validate_camera},
+        resized::{Resizing, delivered},
+        scenario::{Binning, LensSpec, ResizedSpec},
+        validate::validate_camera,
     };
 
     use super::*;
@@ -278,7 +276,7 @@ mod tests {
     }
 
     fn with_table(of: &CameraSpec, path: &Path) -> Result<CameraModel, LensTableError> {
-        let table = Some(LensTable { path: path.into(), grid: None });
+        let table = Some(PathBuf::from(path).into());
         let lens = LensSpec { model: LensModel::Table, coefficients: Vec::new() };
         let mut spec = CameraSpec { lens, lens_table: table, ..of.clone() };
         load_lens_table(&mut spec)?;
@@ -360,9 +358,9 @@ mod tests {
         for path in [&csv, &map] {
             let whole = with_table(&bare, path).unwrap();
             let part = CameraSpec { resized: Some(resized.clone()), ..bare.clone() };
-            let lens_table = Some(LensTable { path: path.clone(), grid: None });
+            let lens_table = Some(path.clone().into());
             let lens = LensSpec { model: LensModel::Table, coefficients: Vec::new() };
-            let mut part = CameraSpec { lens, lens_table, ..part }.resized().unwrap();
+            let mut part = delivered(&CameraSpec { lens, lens_table, ..part }).unwrap();
             load_lens_table(&mut part).unwrap();
             let part = CameraModel::from_spec(&part).unwrap();
             for k in 0..16 * 12 {

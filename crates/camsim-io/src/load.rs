@@ -12,9 +12,10 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 use camsim_core::{
-    exposure::{ExposureError, ExposureTrack},
+    auto_exposure::{ExposureError, ExposureTrack},
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
+    resized::delivered,
     scenario::{
         Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Problem, Rig, Scenario,
         TrackerKind,
@@ -303,7 +304,7 @@ pub fn reload_sequence(scenario: &Scenario, before: &Loaded) -> Result<Loaded, L
 
 fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, LoadError> {
     if scenario.camera.resized.is_some() {
-        let camera = scenario.camera.resized().map_err(LoadError::Resized)?;
+        let camera = delivered(&scenario.camera).map_err(LoadError::Resized)?;
         return load_or_reuse(&Scenario { camera, ..scenario.clone() }, before);
     }
     let reusable = before.map(|before| (before, &before.sequence.scenario));
@@ -368,7 +369,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         let (frames, log_s) = (sequence.frames, last_s - first_s);
         return Err(LoadError::OutsideLog { frames, first_s: sequence.start_s, log_s });
     }
-    let exposures = ExposureTrack::new(&sequence)?.map(Arc::new);
+    let exposures = ExposureTrack::new(&sequence)?.map(|track| Arc::new(track) as _);
     let sequence = Sequence { exposures, ..sequence };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(sensor_warnings(scenario, &log, &sequence.path.trajectory));

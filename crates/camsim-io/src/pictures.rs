@@ -4,10 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    photometric::vignette_part,
+    photometric::{GrayImage, vignette_part},
     scenario::CameraSpec,
     scene::{Encoding, Texture},
-    sequence::GrayImage,
 };
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
 

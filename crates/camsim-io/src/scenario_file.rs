@@ -7,7 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
-use camsim_core::scenario::{CameraSpec, Preset, Problem, Rig, Scenario, checked_camera, checked_rig};
+use camsim_core::scenario::{CameraSpec, Preset, Problem, Rig, Scenario};
 use thiserror::Error;
 
 pub(crate) mod check;
@@ -21,6 +21,7 @@ mod similar;
 pub(crate) mod tree;
 mod wrong_file_kind;
 
+use camsim_core::{validate::checked_camera, validate::checked_rig};
 pub use listing::{json_schema, print_default};
 pub(crate) use paths::for_each_path;
 pub use randomize::{

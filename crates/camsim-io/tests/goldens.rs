@@ -16,10 +16,9 @@ use camsim_core::{
     apply::{IdealFrame, Motion, Pipeline, Settings},
     camera::CameraModel,
     frame::RenderedFrame,
-    photometric::vignette_weights,
+    photometric::{GrayImage, vignette_weights},
     scenario::{CameraSpec, FieldOr, LensModel, LensSpec, PhotometricSpec, Preset, ShutterSpec, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
-    sequence::GrayImage,
     temporal::displacement,
 };
 use camsim_io::{frame_file::read_frame, pictures::read_gray_image};

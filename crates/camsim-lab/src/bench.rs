@@ -6,7 +6,7 @@
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
-use camsim_core::{mount::MountError, reference::OracleError, scenario::validate};
+use camsim_core::{mount::MountError, reference::OracleError, validate::validate};
 use camsim_engine::{Engine, GpuError, RenderError};
 use serde::Serialize;
 

@@ -206,7 +206,7 @@ impl Planner {
             return face.plan(frame);
         }
         // The same picture has the same plan, to the last bit.
-        let picture = self.inputs.sequence.scenario.picture(frame);
+        let picture = self.inputs.sequence.picture(frame);
         if picture != frame {
             return Ok(FramePlan { frame, ..self.plan(picture)? });
         }

@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use camsim_core::{
     photometric::Photometry,
     pose::CameraPose,
-    scenario::Scenario,
     scene::Scene,
+    sequence::Sequence,
     shutter::RowAxis,
     temporal::{IdealGeometry, MAX_KEYS, TapStage, displacement::RK2_STEP_DEG},
 };
@@ -101,11 +101,12 @@ pub struct Truth {
 /// Uniforms of a frame. `coords_phase` in [-0.5, 0.5] picks the instant of the exposure at which source
 /// coordinates are reported.
 #[must_use]
-pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
+pub fn frame_uniforms(plan: &FramePlan, sequence: &Sequence, coords_phase: f32) -> FrameUniforms {
     // Long because: a line for each field of the shaders' struct.
+    let scenario = &sequence.scenario;
     let photometric = &scenario.camera.photometric;
     let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
-    let noise_seed = scenario.noise_seed();
+    let noise_seed = sequence.noise_seed();
     let (axis, lines, fields) = table_shape(&plan.shutter);
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
     let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
@@ -149,7 +150,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         noise_sigma: stage.noise_sigma,
         vignette_thresholds: photometric.vignette_thresholds.map(|t| t as f32),
         seed: [noise_seed as u32, (noise_seed >> 32) as u32],
-        frame_number: scenario.picture(plan.frame) as u32,
+        frame_number: sequence.picture(plan.frame) as u32,
         mono: u32::from(stage.is_mono),
         key_position_ned_m: plan.key_pose.position_ned_m.as_vec3().extend(0.0).to_array(),
         ned_from_key_x: column(0),

@@ -10,7 +10,7 @@ use camsim_core::sequence::Sequence;
 use eframe::egui;
 
 use crate::{
-    display_image, dropped_files,
+    display_image,
     engine::{EngineHandle, FrameRequest, OracleRequest, Picture},
     export::Exporter,
     fonts,
@@ -18,7 +18,7 @@ use crate::{
     message::{Message, Outbox},
     panes,
     settings::Settings,
-    state::{State, UnsavedPrompt},
+    state::{State, UnsavedPrompt, dropped_files},
 };
 
 /// Key that settings are stored under.

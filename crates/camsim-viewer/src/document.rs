@@ -9,7 +9,7 @@ use std::{
     sync::Arc,
 };
 
-use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, checked_rig};
+use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario};
 use camsim_io::{
     scenario_file::{CAMERAS, ValueKind, kinds, read_random_scenario, rig_of_table, rig_table},
     shell::quoted,
@@ -19,6 +19,7 @@ use toml::{Table, Value};
 
 mod changes;
 
+use camsim_core::validate::checked_rig;
 use changes::{collect_changes, collect_removed};
 
 /// Undo steps, at most.

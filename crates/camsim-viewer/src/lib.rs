@@ -29,7 +29,6 @@
 mod app;
 mod display_image;
 mod document;
-mod dropped_files;
 mod engine;
 mod engine_state;
 mod export;

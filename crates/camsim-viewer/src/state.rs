@@ -10,7 +10,6 @@ use eframe::egui;
 
 use crate::{
     document::Document,
-    dropped_files,
     engine::{FrameRequest, OracleRequest, Picture, Reply, Size, Stage},
     engine_state::EngineState,
     export::{ExportJob, Exporter},
@@ -20,6 +19,8 @@ use crate::{
     timeline::Timeline,
     view::{Compare, Tab, View},
 };
+
+pub(crate) mod dropped_files;
 
 /// Time without input after which full frames are rendered in place of previews, seconds.
 pub const IDLE_S: f64 = 0.2;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_core::scenario::{DatasetFormat, Scenario, validate};
+use camsim_core::scenario::{DatasetFormat, Scenario};
 use camsim_io::{
     dataset::{DatasetError, ExportOptions, RunFolder, Watch, export, judge_lens, require},
     shell::quoted,
@@ -20,6 +20,7 @@ use crate::{
     progress::frames_bar,
     render_run::Lock,
 };
+use camsim_core::validate::validate;
 
 /// Write frames in the layout of another program
 ///

@@ -12,6 +12,7 @@ use camsim_core::{
         disocclusion, image_errors, silhouettes, truth_errors,
     },
     scenario::{Auto, CameraSpec, Channel, Face, Solver},
+    shutter::Shutter,
 };
 use camsim_engine::{Finished, Session};
 use camsim_plan::{FramePlan, Planner, Predicted};
@@ -184,7 +185,7 @@ pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> 
 /// How much there is to trace, as each pixel is traced by the reference renderer.
 fn work(camera: &CameraSpec, pictures: usize, with_pictures: bool) -> String {
     let [width, height] = camera.size_px;
-    let is_exposed = camera.longest_shutter().is_ok_and(|shutter| shutter.exposure_s() > 0.0);
+    let is_exposed = Shutter::longest_of(camera).is_ok_and(|shutter| shutter.exposure_s() > 0.0);
     let instants = if is_exposed { 1 + PHASES as u64 } else { 1 };
     let pixels = pictures as u64 * instants * u64::from(width) * u64::from(height);
     format!(

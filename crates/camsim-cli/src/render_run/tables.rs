@@ -11,6 +11,7 @@ use camsim_core::{
     pose::BodyState,
     scenario::{Channel, Scenario, TrajectorySpan},
     sequence::Sequence,
+    shutter::Shutter,
     trajectory::Trajectory,
 };
 use camsim_io::{
@@ -187,7 +188,7 @@ fn seen_s(cameras: &[(&Sequence, Option<[u64; 2]>)]) -> Result<Option<[f64; 2]>,
     for (sequence, frames) in cameras {
         let Some([first, last]) = *frames else { continue };
         let camera = &sequence.scenario.camera;
-        let (begin_s, end_s) = camera.longest_shutter().or_bad_input()?.window_s();
+        let (begin_s, end_s) = Shutter::longest_of(camera).or_bad_input()?.window_s();
         let nominal_s = |frame: u64| sequence.start_s + (frame as f64 + camera.phase) / camera.fps;
         let late_s = camera.timing.as_ref().map_or(0.0, |timing| 1e-3 * timing.late_ms);
         let first_s = nominal_s(first).min(sequence.stamp_s(first as f64)) + begin_s;

@@ -1,8 +1,8 @@
 //! Calibrations by zoom value.
 
 use super::{CameraError, CameraModel};
-use crate::lens::Lens;
 use crate::scenario::{CameraSpec, ZoomSpec};
+use crate::{lens::Lens, lens::ModelFacts};
 
 /// The `[[camera.zoom]]` table. Every number of a calibration is linear in the zoom value between two
 /// entries, and constant beyond the ends.
@@ -33,7 +33,7 @@ impl ZoomTable {
         let count = spec.zoom.iter().map(|entry| entry.coefficients.len()).max().unwrap_or(0);
         let mut entries = spec.zoom.clone();
         for (index, entry) in entries.iter_mut().enumerate() {
-            let facts = spec.lens.model.facts();
+            let facts = ModelFacts::of(spec.lens.model);
             entry.coefficients = (0..count).map(|i| facts.or_default(&entry.coefficients, i)).collect();
             camera(&format!("camera.zoom[{index}]"), spec, entry)?;
         }

@@ -21,11 +21,11 @@ use crate::{
     imaging::with_facts,
     noise::{camera_seed, tail_table},
     photometric::{Photometry, photometric},
-    scenario::{CameraSpec, PointSpreadSpec},
+    scenario::{CameraSpec, LoadedFile, PointSpreadSpec},
     timing_faults::picture_of,
 };
 
-pub use kernel::{KernelError, KernelFile, SpreadKernel};
+pub use kernel::{KernelError, SpreadKernel};
 pub use transfer::LensTransfer;
 
 use beyond::Nearest;
@@ -80,7 +80,7 @@ impl OpticsKey {
             camera.point_spread.as_ref().filter(|_| camera.face.is_none() && camera.primary.is_none())?;
         Some(Self {
             spec: spec.clone(),
-            kernel: spec.kernel.as_ref().and_then(|file| file.kernel.clone()),
+            kernel: spec.kernel.as_ref().and_then(LoadedFile::content),
             size_px: camera.size_px,
             sensor_pixel_um: camera.sensor.as_ref().and_then(|sensor| with_facts(sensor).pixel_um),
             simple: camera.sensor.is_none().then(|| (simple_model(camera), seed)),

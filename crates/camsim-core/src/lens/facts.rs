@@ -38,31 +38,28 @@ pub(super) enum Shape {
     Table,
 }
 
-impl LensModel {
-    /// What is known of the model.
+impl ModelFacts {
+    /// What is known of a model.
     #[must_use]
-    pub const fn facts(self) -> &'static ModelFacts {
-        match self {
-            Self::Pinhole => &pinhole::FACTS,
-            Self::BrownConrady => &brown_conrady::FACTS,
-            Self::KannalaBrandt => &kannala_brandt::FACTS,
-            Self::BrownConradyPrism => &brown_conrady_prism::FACTS,
-            Self::Fisheye624 => &fisheye624::FACTS,
-            Self::FTheta => &f_theta::FACTS,
-            Self::FThetaInverse => &f_theta::INVERSE_FACTS,
-            Self::DoubleSphere => &double_sphere::FACTS,
-            Self::Eucm => &eucm::FACTS,
-            Self::Ucm => &ucm::FACTS,
-            Self::Mei => &mei::FACTS,
-            Self::Division => &division::FACTS,
-            Self::Fov => &fov::FACTS,
-            Self::Equirectangular => &equirectangular::FACTS,
-            Self::Table => &table::FACTS,
+    pub const fn of(model: LensModel) -> &'static Self {
+        match model {
+            LensModel::Pinhole => &pinhole::FACTS,
+            LensModel::BrownConrady => &brown_conrady::FACTS,
+            LensModel::KannalaBrandt => &kannala_brandt::FACTS,
+            LensModel::BrownConradyPrism => &brown_conrady_prism::FACTS,
+            LensModel::Fisheye624 => &fisheye624::FACTS,
+            LensModel::FTheta => &f_theta::FACTS,
+            LensModel::FThetaInverse => &f_theta::INVERSE_FACTS,
+            LensModel::DoubleSphere => &double_sphere::FACTS,
+            LensModel::Eucm => &eucm::FACTS,
+            LensModel::Ucm => &ucm::FACTS,
+            LensModel::Mei => &mei::FACTS,
+            LensModel::Division => &division::FACTS,
+            LensModel::Fov => &fov::FACTS,
+            LensModel::Equirectangular => &equirectangular::FACTS,
+            LensModel::Table => &table::FACTS,
         }
     }
-}
-
-impl ModelFacts {
     /// The names of the coefficients in one line.
     #[must_use]
     pub fn order(&self) -> String {
@@ -95,8 +92,8 @@ mod tests {
     #[test]
     fn names_are_those_of_files() {
         for &model in LensModel::ALL {
-            assert_eq!(model.name(), model.facts().name);
-            let name = IntoDeserializer::<Error>::into_deserializer(model.facts().name);
+            assert_eq!(model.name(), ModelFacts::of(model).name);
+            let name = IntoDeserializer::<Error>::into_deserializer(ModelFacts::of(model).name);
             assert_eq!(LensModel::deserialize(name).unwrap(), model);
         }
     }

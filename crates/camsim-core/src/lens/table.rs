@@ -1,9 +1,8 @@
 //! A lens by a table of points: the spline through it, and its certified inverse.
 
-use std::{f64::consts::PI, path::PathBuf, sync::Arc};
+use std::{f64::consts::PI, sync::Arc};
 
 use glam::{DMat2, DVec2, DVec3};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::branch::{Branch, ChartMap};
 use super::direction::{
@@ -23,33 +22,6 @@ pub(super) const FACTS: ModelFacts = ModelFacts {
 
 /// How far outside of its grid a point still belongs to it, in nodes: rounding.
 const ON_BORDER: f64 = 1e-6;
-
-/// `camera.lens_table`: the name of a file, and what was read from it. Equal names are equal, as with other files.
-#[derive(Clone, Debug, Default)]
-pub struct LensTable {
-    /// The file.
-    pub path: PathBuf,
-    /// Its content, once read.
-    pub grid: Option<Arc<LensGrid>>,
-}
-
-impl PartialEq for LensTable {
-    fn eq(&self, other: &Self) -> bool {
-        self.path == other.path
-    }
-}
-
-impl Serialize for LensTable {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.path.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for LensTable {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        PathBuf::deserialize(deserializer).map(|path| Self { path, grid: None })
-    }
-}
 
 /// How a table states rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

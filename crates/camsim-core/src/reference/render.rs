@@ -8,10 +8,9 @@ use super::{FrameView, Oracle, RaySample, lamps::RowLamps};
 use crate::{
     frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
-    photometric::{Photometry, photometric},
+    photometric::{GrayImage, Photometry, photometric},
     pose::CameraPose,
     scenario::{Channel, Face, VignettingSpec},
-    sequence::GrayImage,
     temporal::IdealGeometry,
 };
 
@@ -143,7 +142,7 @@ impl Oracle {
             oracle: self,
             photometry: Photometry::before_spread(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
-            picture: self.sequence.scenario.picture(frame) as u32,
+            picture: self.sequence.picture(frame) as u32,
             options,
             noise_table: tail_table(),
             truth: depth || coords,
@@ -352,7 +351,7 @@ impl FrameJob<'_> {
             (map * gain) as f32,
             pixel,
             self.picture,
-            sequence.scenario.noise_seed(),
+            sequence.noise_seed(),
             &self.noise_table,
         )
     }

@@ -226,15 +226,13 @@ fn check_foreign_keys(spec: &BoardSpec, kind: BoardKind) -> Result<(), BoardErro
     }
 }
 
-impl Dictionary {
-    /// Squares along a side of a marker's interior, and its white squares as bits.
-    fn code(self, id: u32) -> (u32, u64) {
-        let id = id as usize;
-        match self {
-            Self::FourByFour => (4, codes::ARUCO_4X4.get(id).map_or(0, |&code| u64::from(code))),
-            Self::FiveByFive => (5, codes::ARUCO_5X5.get(id).map_or(0, |&code| u64::from(code))),
-            Self::SixBySix => (6, codes::ARUCO_6X6.get(id).copied().unwrap_or(0)),
-        }
+/// Squares along a side of a marker's interior, and its white squares as bits.
+fn marker_code(dictionary: Dictionary, id: u32) -> (u32, u64) {
+    let id = id as usize;
+    match dictionary {
+        Dictionary::FourByFour => (4, codes::ARUCO_4X4.get(id).map_or(0, |&code| u64::from(code))),
+        Dictionary::FiveByFive => (5, codes::ARUCO_5X5.get(id).map_or(0, |&code| u64::from(code))),
+        Dictionary::SixBySix => (6, codes::ARUCO_6X6.get(id).copied().unwrap_or(0)),
     }
 }
 

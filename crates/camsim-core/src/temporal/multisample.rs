@@ -4,8 +4,10 @@
 
 use glam::DVec2;
 
+use crate::scenario::IDEAL_SAMPLES;
+
 /// Samples per pixel of a multisampled frame.
-pub const SAMPLES: u32 = 4;
+pub const SAMPLES: u32 = IDEAL_SAMPLES;
 /// Sample positions from the centre of the pixel, pixels: the standard pattern of 4x multisampling. No two
 /// share a row or column, so axis-aligned borders are known to a quarter of a pixel.
 pub const SAMPLE_POSITIONS: [DVec2; 4] = [

@@ -151,8 +151,8 @@ impl<'a> ReversePass<'a> {
             },
             photometry: Photometry::new(&sequence.scenario.camera, plan.exposure.as_ref()),
             vignette: inputs.vignette,
-            noise_seed: sequence.scenario.noise_seed(),
-            picture: sequence.scenario.picture(plan.frame) as u32,
+            noise_seed: sequence.noise_seed(),
+            picture: sequence.picture(plan.frame) as u32,
             noise_table: tail_table(),
             coords_phase: inputs.coords_phase.into(),
         }

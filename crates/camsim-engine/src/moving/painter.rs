@@ -67,11 +67,10 @@ impl Painter {
 
     /// The colour of a pixel with this light.
     pub fn finished(&self, stage: &Photometry, plan: &FramePlan, pixel: [u32; 2], light: Vec3) -> Painted {
-        let scenario = &self.sequence.scenario;
         let i = index(plan, pixel);
         let weight = self.vignette.get(i).or(self.vignette.first()).copied().unwrap_or(1.0);
-        let picture = scenario.picture(plan.frame) as u32;
-        let seed = scenario.noise_seed();
+        let picture = self.sequence.picture(plan.frame) as u32;
+        let seed = self.sequence.noise_seed();
         (i, photometric(stage, light.to_array(), weight, pixel, picture, seed, &self.noise_table))
     }
 

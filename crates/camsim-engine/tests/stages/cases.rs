@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use camsim_core::{
+    photometric::GrayImage,
     scenario::{Auto, Axis, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, VibrationSpec},
-    sequence::{GrayImage, Sequence},
+    sequence::Sequence,
     temporal::{NodeDepths, PathStage, TapStage},
 };
 use camsim_plan::{BlurStage, EdgeStage, FramePlan, Planner, RayStage, TemporalStage};

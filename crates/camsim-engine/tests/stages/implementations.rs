@@ -143,7 +143,7 @@ impl Engines {
 /// What the photometric twin makes of a frame without photometric effects.
 fn with_effects(case: &Case, plain: &RenderedFrame) -> Vec<[f32; 4]> {
     let scenario = &case.sequence.scenario;
-    let (stage, seed) = (Photometry::new(&scenario.camera, None), scenario.noise_seed());
+    let (stage, seed) = (Photometry::new(&scenario.camera, None), case.sequence.noise_seed());
     let weights = case.sequence.vignette_weights().1;
     let table = tail_table();
     let pixels = plain.color_rgba.as_chunks::<4>().0;
@@ -227,7 +227,7 @@ fn renderer_output(
         color_rgba.iter_mut().for_each(|value| *value = half::f16::from_f32(*value).to_f32());
     }
     renderer.set_general_only(is_general);
-    let uniforms = frame_uniforms(plan, &sequence.scenario, case.coords_phase);
+    let uniforms = frame_uniforms(plan, &sequence, case.coords_phase);
     let rows = RowTable::new(plan, &sequence.path);
     let (picture, truth) =
         renderer.reverse(&ReverseInputs { plan, uniforms: &uniforms, rows: &rows }, buffer);

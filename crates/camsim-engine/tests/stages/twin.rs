@@ -282,7 +282,7 @@ impl<'a> Twin<'a> {
             weight,
             pixel,
             plan.frame as u32,
-            scenario.noise_seed(),
+            self.case.sequence.noise_seed(),
             &self.noise_table,
         );
         let truth = self.truth(uv, &nodes, &mid);

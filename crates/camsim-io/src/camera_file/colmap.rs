@@ -1,7 +1,7 @@
 //! COLMAP's `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`. In COLMAP the centre of the first pixel
 //! is (0.5, 0.5).
 
-use camsim_core::scenario::LensModel;
+use camsim_core::{lens::ModelFacts, scenario::LensModel};
 use serde_json::{Value, json};
 
 use super::document::{Document, KeyProblem, SyntaxProblem, number, numbers, size, word};
@@ -131,7 +131,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, KeyProblem> {
     let coefficients = match lens {
         LensModel::KannalaBrandt => ["k1", "k2", "k3", "k4"].map(or_zero).to_vec(),
         LensModel::BrownConrady => ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(or_zero).to_vec(),
-        _ => lens.facts().coefficients.iter().map(|name| or_zero(name)).collect(),
+        _ => ModelFacts::of(lens).coefficients.iter().map(|name| or_zero(name)).collect(),
     };
     let size_px = size("WIDTH", [number(value, "width")?, number(value, "height")?])?;
     let focal_px = [get("fx").unwrap_or(f), get("fy").unwrap_or(f)];

@@ -70,7 +70,7 @@ fn a_scenario_gets_what_a_layout_needs_and_no_more() {
     assert_eq!(twin.channels.as_deref(), Some(&truth[..]));
     assert_eq!(added, ["twin pinhole", "channel rows", "format png"]);
     assert!(require(&mut kitti, DatasetFormat::Kitti).unwrap().is_empty(), "it has all of it");
-    assert_eq!(camsim_core::scenario::validate(&kitti), []);
+    assert_eq!(camsim_core::validate::validate(&kitti), []);
 
     let mut pinhole = scenario("");
     require(&mut pinhole, DatasetFormat::Kitti).unwrap();

@@ -2,8 +2,10 @@
 
 use camsim_core::{
     flight_log::FlightLog,
+    lens::ModelFacts,
+    photometric::GrayImage,
     scenario::{CameraSpec, LensSpec, Scenario},
-    sequence::{GrayImage, Sequence},
+    sequence::Sequence,
 };
 
 use super::LoadError;
@@ -80,7 +82,7 @@ pub(super) fn optics_warnings(sequence: &Sequence) -> Vec<String> {
 /// Warns of a lens model that is named without coefficients.
 fn coefficients_warning(camera: &CameraSpec) -> Option<String> {
     let LensSpec { model, coefficients } = &camera.lens;
-    let facts = model.facts();
+    let facts = ModelFacts::of(*model);
     (coefficients.is_empty() && camera.zoom.is_empty() && !facts.coefficients.is_empty()).then(|| {
         format!(
             "camera.lens.coefficients is empty: {} has its default values of {}, which are no lens that was measured",

@@ -96,6 +96,7 @@ mod tests {
     };
 
     use super::*;
+    use camsim_core::resized::delivered;
 
     #[test]
     fn noise_of_8_bit_values_is_said() {
@@ -145,7 +146,7 @@ mod tests {
             let resized = ResizedSpec { crop_px: Some(crop_px), ..ResizedSpec::default() };
             let camera =
                 CameraSpec { shutter, resized: Some(resized), size_px: [160, 120], ..CameraSpec::default() };
-            part_warning(&camera.resized().expect("the part is within the picture")).unwrap_or_default()
+            part_warning(&delivered(&camera).expect("the part is within the picture")).unwrap_or_default()
         };
         // 30 rows of 20 / 120 ms.
         let above = text([0, 0, 160, 60], 1.0);

@@ -189,7 +189,6 @@ fn moved_folders_and_inputs_can_be_resumed() {
 #[test]
 fn all_paths_of_a_scenario_are_made_relative() {
     use crate::scenario_file::{ValueKind, kinds};
-    use camsim_core::lens::LensTable;
     let text = r#"
             flight = { log = "x/1" }
             [camera]
@@ -209,7 +208,7 @@ fn all_paths_of_a_scenario_are_made_relative() {
         "#;
     let mut scenario = parse_scenario(text, Path::new("s.toml"), &[]).unwrap();
     // No lens has a table and a zoom.
-    scenario.camera.lens_table = Some(LensTable { path: "x/13.csv".into(), grid: None });
+    scenario.camera.lens_table = Some(PathBuf::from("x/13.csv").into());
     let mut tree = serde_json::to_value(&scenario).unwrap();
     let mut visited = Vec::new();
     for_each_path(&mut tree, &mut |key, _| visited.push(key.replace(".0.", ".").replace(".1.", ".")));

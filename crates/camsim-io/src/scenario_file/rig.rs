@@ -1,6 +1,6 @@
 //! Scenarios of one camera or several as trees of values: `cameras` in place of `camera`.
 
-use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario, checked_cameras};
+use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario};
 use serde::{Serialize, de::Error as _};
 use serde_json::Value as Json;
 use toml::{Table, Value};
@@ -11,6 +11,7 @@ use super::{
     tree::Tree,
     unexpected,
 };
+use camsim_core::validate::checked_cameras;
 
 /// The scenarios of a tree with paths resolved. Ranges are not checked, and `camera.resized` is not applied.
 ///

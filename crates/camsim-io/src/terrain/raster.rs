@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use camsim_core::{
+    photometric::GrayImage,
     scene::{Encoding, Texture},
-    sequence::GrayImage,
 };
 use rayon::prelude::*;
 

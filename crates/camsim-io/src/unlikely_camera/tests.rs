@@ -1,6 +1,7 @@
 use camsim_core::scenario::{Binning, ImageCircleSpec, LensSpec, ResizedSpec, ShutterSpec};
 
 use super::*;
+use camsim_core::resized::delivered;
 
 fn lens(model: LensModel, focal_px: f64, coefficients: &[f64]) -> CameraSpec {
     let lens = LensSpec { model, coefficients: coefficients.to_vec() };
@@ -133,7 +134,7 @@ fn pixels_of_unequal_numbers_are_not_square() {
         let binning = Some(Binning::Each([2.0, 1.0]));
         let resized = Some(ResizedSpec { binning, ..ResizedSpec::default() });
         let camera = CameraSpec { focal_px, resized, ..CameraSpec::default() };
-        told(&camera.resized().expect("640 is even"))
+        told(&delivered(&camera).expect("640 is even"))
     };
     assert_eq!(binned([500.0, 505.0]), "");
     assert!(binned([1000.0, 500.0]).contains("differs by 100 %"));

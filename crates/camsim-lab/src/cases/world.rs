@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use camsim_core::{
+    photometric::GrayImage,
     scene::{Encoding, Mesh, MeshVertex, Scene, Shape, Terrain, TerrainError, Texture, Wrap},
-    sequence::GrayImage,
 };
 use glam::DVec3;
 use rayon::prelude::*;

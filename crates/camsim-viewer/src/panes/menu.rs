@@ -10,9 +10,8 @@ use super::{
 };
 use crate::{
     document::Document,
-    dropped_files::PICTURE_USES,
     message::{Message, Outbox, PathPrompt},
-    state::{State, UnsavedPrompt},
+    state::{State, UnsavedPrompt, dropped_files::PICTURE_USES},
 };
 
 /// Least width of a message in the line, points.

@@ -6,7 +6,11 @@ use camsim_core::scenario::BoardSpec;
 use eframe::egui;
 
 use super::harness::demo;
-use crate::{dropped_files, message::Message, settings::Settings, state::State};
+use crate::{
+    message::Message,
+    settings::Settings,
+    state::{State, dropped_files},
+};
 
 fn new_state(scenario: Option<PathBuf>) -> State {
     let mut state = State::new(Settings::default(), None);

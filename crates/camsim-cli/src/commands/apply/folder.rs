@@ -5,8 +5,8 @@ use std::{collections::BTreeMap, path::Path};
 use anyhow::anyhow;
 use camsim_core::{
     apply::{NoSourceCounts, Pipeline},
+    photometric::GrayImage,
     scenario::{CameraSpec, Channel, ImageFormat, OutputSpec},
-    sequence::GrayImage,
     shutter::Shutter,
 };
 use camsim_io::{

@@ -1,38 +1,9 @@
 //! Measured kernels: the picture of a point of light.
 
-use std::{f64::consts::TAU, path::PathBuf, sync::Arc};
+use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-/// `camera.point_spread.kernel`: the name of a file, and what was read from it. Equal names are equal, as
-/// with other files.
-#[derive(Clone, Debug, Default)]
-pub struct KernelFile {
-    /// The file.
-    pub path: PathBuf,
-    /// Its content, once read.
-    pub kernel: Option<Arc<SpreadKernel>>,
-}
-
-impl PartialEq for KernelFile {
-    fn eq(&self, other: &Self) -> bool {
-        self.path == other.path
-    }
-}
-
-impl Serialize for KernelFile {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.path.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for KernelFile {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        PathBuf::deserialize(deserializer).map(|path| Self { path, kernel: None })
-    }
-}
 
 /// Values that are no kernel.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

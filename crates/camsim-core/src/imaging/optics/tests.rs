@@ -186,7 +186,7 @@ fn a_measured_kernel_is_the_picture_of_a_point() {
     let red: Vec<f64> = (0..15).map(f64::from).collect();
     let channels = [red, vec![1.0; 15], vec![2.0; 15]];
     let kernel = SpreadKernel::new([5, 3], channels.clone()).expect("a kernel");
-    let file = KernelFile { path: "k.png".into(), kernel: Some(Arc::new(kernel)) };
+    let file = LoadedFile::new("k.png", kernel);
     let spec = PointSpreadSpec { kernel: Some(file), ..PointSpreadSpec::default() };
     let point = picture(|x, y| if (x, y) == (48.0, 40.0) { [1.0; 3] } else { [0.0; 3] });
     let rgba = spread(spec, point);
@@ -206,7 +206,7 @@ fn optics_are_kept_while_they_are_the_same() {
     let kernel = |value: f64| {
         let channels = [vec![1.0, value], vec![1.0, value], vec![1.0, value]];
         let kernel = SpreadKernel::new([2, 1], channels).expect("a kernel");
-        let file = KernelFile { path: "k.csv".into(), kernel: Some(Arc::new(kernel)) };
+        let file = LoadedFile::new("k.csv", kernel);
         camera(PointSpreadSpec { kernel: Some(file), ..PointSpreadSpec::default() })
     };
     let table = |optics: &Optics| optics.simple.as_ref().map(|simple| simple.noise_table.as_ptr());

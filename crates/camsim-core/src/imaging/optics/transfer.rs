@@ -9,7 +9,7 @@ use rustfft::num_complex::{Complex32, Complex64};
 use super::{bessel::jinc, kernel::SpreadKernel};
 use crate::{
     imaging::with_facts,
-    scenario::{CameraSpec, PointSpreadSpec},
+    scenario::{CameraSpec, LoadedFile, PointSpreadSpec},
 };
 
 /// Width of a diffraction pattern beyond which its faint rings are cut off, in units of wavelength times
@@ -43,7 +43,7 @@ impl LensTransfer {
         let pixel_um = spec.pixel_um.or(sensor_pixel_um).unwrap_or(f64::INFINITY);
         let [red, green, blue] = spec.wavelength_nm.rgb();
         let f_number = spec.f_number.unwrap_or(0.0);
-        let kernel = spec.kernel.as_ref().and_then(|file| file.kernel.clone());
+        let kernel = spec.kernel.as_ref().and_then(LoadedFile::content::<SpreadKernel>);
         Self {
             sigma_px: spec.sigma_px.unwrap_or(0.0),
             airy_px: [red, green, blue].map(|nm| 1e-3 * nm * f_number / pixel_um),

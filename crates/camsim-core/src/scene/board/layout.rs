@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{BoardPoint, codes};
+use super::{BoardPoint, codes, marker_code};
 use crate::scenario::Dictionary;
 
 /// Black squares around a tag's interior: Kalibr prints AprilTags with two, ArUco markers have one.
@@ -138,7 +138,7 @@ pub(super) fn charuco(
     let white = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 1);
     for (id, (i, j)) in (first_id..).zip(white) {
         let low_m = layout.low_m + square_m * DVec2::new(count(i), count(j)) + 0.5 * (square_m - marker_m);
-        let (side, code) = dictionary.code(id);
+        let (side, code) = marker_code(dictionary, id);
         tag(&mut layout.shapes, low_m, marker_m, side, code, ARUCO_BORDER);
     }
     layout

@@ -194,7 +194,7 @@ fn noise_depends_on_seed_name_and_sample_but_not_on_the_window() {
 
 #[test]
 fn spans_have_a_lead_before_and_after_the_frames() {
-    let mut scenario = crate::scenario::good_scenario();
+    let mut scenario = crate::validate::tests::good();
     assert_eq!(span_s(&scenario, 30.0), [-1.0, 31.0]);
     scenario.flight.window_s = Some([5.0, 10.0]);
     scenario.flight.speed = 2.0;

@@ -9,6 +9,7 @@ use camsim_core::{
     frame::{Plane, PlaneValues, RenderedFrame, RowRecord},
     pose::{BodyState, CameraPose},
     scenario::{Channel, ImageFormat, Scenario},
+    twin::scenario_of,
 };
 use glam::{DQuat, DVec3};
 use tempfile::TempDir;
@@ -104,7 +105,11 @@ impl Sample {
         let rows = trajectory_csv([999_000_001, 1_250_000_000].map(body));
         write_atomic(&self.run().join("trajectory.csv"), rows.as_bytes()).unwrap();
         for twin in &self.scenario.output.twin {
-            write_run(&self.run().join(&twin.name), &self.scenario.twin(twin, None).unwrap(), columns);
+            write_run(
+                &self.run().join(&twin.name),
+                &scenario_of(&self.scenario, twin, None).unwrap(),
+                columns,
+            );
         }
     }
 

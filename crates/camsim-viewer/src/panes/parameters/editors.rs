@@ -1,6 +1,6 @@
 //! Editors of values, by kind.
 
-use camsim_core::scenario::keys::Key;
+use camsim_core::{lens::ModelFacts, scenario::keys::Key};
 use camsim_io::scenario_file::ValueKind;
 use eframe::egui::{self, Role, Ui};
 use toml::Value;
@@ -174,7 +174,7 @@ fn numbers(
     out: &mut Outbox,
 ) -> Option<Edit> {
     let labels = match key.rsplit('.').next() {
-        Some("coefficients") => document.scenario.camera.lens.model.facts().coefficients,
+        Some("coefficients") => ModelFacts::of(document.scenario.camera.lens.model).coefficients,
         _ => facts.field.names,
     };
     let array = value?.as_array()?;

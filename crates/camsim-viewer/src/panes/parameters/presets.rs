@@ -102,7 +102,7 @@ pub fn show(ui: &mut Ui, out: &mut Outbox) {
 
 #[cfg(test)]
 mod tests {
-    use camsim_core::{camera::CameraModel, scenario::validate_camera};
+    use camsim_core::{camera::CameraModel, validate::validate_camera};
 
     use super::*;
 
