@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _camsim, _command, _toml
+from . import _camsim, _toml
 from ._arrays import linear_of, numbers_of, pair_of, picture_of, rows_of
 from ._errors import InputError, forget_paths, name_path
 from .scenario import Scenario
@@ -223,7 +223,7 @@ def compare(a: ArrayLike | Path, b: ArrayLike | Path) -> Comparison:
     >>> camsim.compare("run-1/color", "run-2/color").rmse
     """
     if isinstance(a, (str, os.PathLike)) and isinstance(b, (str, os.PathLike)):
-        report: dict[str, Any] = json.loads(_command.output(["compare", a, b, "--json"]))
+        report: dict[str, Any] = json.loads(_camsim.compare_files(a, b))
         report.update({name: tuple(map(_told, report[name])) for name in ("formats", "files")})
         report.update({name: tuple(report[name]) for name in ("only_in_a", "only_in_b")})
         return Comparison(**_told(report))
@@ -293,13 +293,11 @@ def verify(scenario: Scenario, frames: int | Sequence[int] | None = None, *, pic
     >>> camsim.verify(scenario, [7])["kept"]
     True
     """
-    words = ["verify", "{scenario}", "--json"]
+    numbers = None
     if frames is not None:
         wanted = frames if isinstance(frames, Iterable) and not isinstance(frames, str) else [frames]
-        numbers = [str(scenario._number(frame)) for frame in wanted]
+        numbers = sorted({scenario._number(frame) for frame in wanted})
         if not numbers:
             raise InputError("verify: frames is empty: give numbers of frames, or leave it out")
-        words += ["--frames", ",".join(numbers)]
-    words += ["--pictures"] if pictures else []
-    report: dict[str, Any] = json.loads(scenario._command(words, fails_with_output=True))
+    report: dict[str, Any] = json.loads(scenario._native.verify(numbers, pictures))
     return report

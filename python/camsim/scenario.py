@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, SupportsIndex, overload
 
-from . import _camsim, _command, _toml
-from ._errors import InputError, ScenarioWarning, forget_paths, in_users_words, name_path
+from . import _camsim, _toml
+from ._errors import InputError, ScenarioWarning, in_users_words, name_path
 from .frame import Frame
 from .frames import Frames, channel_names, frame_number
 from .inputs import InputFiles
@@ -125,7 +124,7 @@ class Scenario(Sequence[Frame]):
     def set(self, key: str, value: Any) -> None:
         """Changes a key of this scenario. Frames under way are not changed.
 
-        :param key: With dots, as in the file; elements of lists by number, cameras of `[[cameras]]` by name.
+        :param key: With dots, as in the file; elements of lists by number, or by name where they have one.
         :param value: Of a table the keys that change: the others of the table stay. Lists and values are replaced.
             None takes a key or a whole table out, so that its default holds.
         :raises camsim.InputError: There is no such key, or the value cannot be used; nothing is changed then.
@@ -326,27 +325,8 @@ class Scenario(Sequence[Frame]):
         >>> print(scenario.explain(7))
         >>> scenario.explain(7, as_dict=True)["plan"]
         """
-        number = self._number(frame)
-        words = ["explain", "{scenario}", "--frame", str(number), *(["--json"] if as_dict else [])]
-        text = self._command(words)
+        text = self._native.explain(self._number(frame), as_dict)
         return json.loads(text) if as_dict else text
-
-    def _command(self, words: Sequence[str], *, fails_with_output: bool = False) -> str:
-        """What a command prints of this scenario; `{scenario}` among the words is its file."""
-        with tempfile.TemporaryDirectory(prefix="camsim-") as folder:
-            path = os.path.join(folder, "scenario.json")
-            name_path(path, "the scenario")
-            with open(path, "w", encoding="utf-8") as file:
-                json.dump({"scenario": self.to_dict()}, file)
-            camera = ["--camera", self.camera] if len(self._native.cameras) > 1 else []
-            # That of the reference renderer is among the keys.
-            is_named = self._native.backend in ("cpu", "gpu")
-            backend = ["--backend", self._native.backend] if is_named else []
-            command = [path if word == "{scenario}" else word for word in words]
-            try:
-                return _command.output([*command, *camera, *backend], fails_with_output=fails_with_output)
-            finally:
-                forget_paths(folder)
 
     def __repr__(self) -> str:
         camera = f" of {self.camera}" if self.camera else ""

@@ -52,6 +52,18 @@ impl Renderer {
         }
     }
 
+    /// The engine on its adapter, for what the reference renderer has no answer to: its own plans and errors.
+    ///
+    /// # Errors
+    /// The adapter cannot be opened, or this process is a fork of one that has rendered.
+    pub fn engine(self) -> Result<&'static Engine, Failure> {
+        refuse_fork()?;
+        match self {
+            Self::Engine(backend) => engine(backend),
+            Self::Reference => engine(Backend::Auto),
+        }
+    }
+
     /// The renderer of a sequence, if this one was asked for.
     pub fn of_sequence(self, sequence: &Sequence) -> Self {
         match self {

@@ -40,10 +40,10 @@ mod _camsim {
     use super::{
         apply::apply,
         camera::Camera,
-        command::{run, run_main},
+        command::run_main,
         frame::write_picture,
         lens::Lens,
-        pictures::{board_of_file, board_of_keys, compare},
+        pictures::{board_of_file, board_of_keys, compare, compare_files},
         scenario::{Scenario, default_scenario, unpack_demo},
         stream::{Stream, stop_streams},
         trajectory::Trajectory,

@@ -10,7 +10,7 @@ use camsim::{
     },
     io::{
         board_file::read_board,
-        compare::Figures,
+        compare::{Figures, compare_paths},
         load::{Loaded, board_position_ned_m},
     },
 };
@@ -34,6 +34,14 @@ pub fn compare(
     let (a, b) = (view(&a)?, view(&b)?);
     let figures = py.detach(|| metrics::compare(a, b)).or_input_error()?;
     serde_json::to_string(&Figures::from(&figures)).or_run_error()
+}
+
+/// Differences between two pictures in files, or between those of the same name in two folders, as JSON of `camsim
+/// compare`.
+#[pyfunction]
+pub fn compare_files(py: Python<'_>, a: PathBuf, b: PathBuf) -> PyResult<String> {
+    let report = py.detach(|| compare_paths(&a, &b)).or_input_error()?;
+    serde_json::to_string(&report).or_run_error()
 }
 
 /// A picture of height x width x channels, of which a fourth is alpha.

@@ -6,10 +6,12 @@ use std::{
 };
 
 use camsim::{
+    cli::{self, failure::Failure},
     core::{
         scenario::{Channel, Preset, Rig},
         sequence::Sequence,
     },
+    engine::verify::Verification,
     io::{
         builtin,
         load::{LoadError, Loaded, load_sequence, reload_sequence},
@@ -22,7 +24,7 @@ use pyo3::{prelude::*, types::PyDict};
 use crate::{
     camera::Camera,
     engine::{Renderer, SessionKey, SessionPool, in_own_pool, lock},
-    error::{OrRaise, input_error},
+    error::{OrRaise, input_error, raise},
     pictures::board_of,
     sensors,
     source::Source,
@@ -352,6 +354,25 @@ impl Scenario {
         let key = self.key(py, channels)?;
         let delivery = py.detach(|| render_one(&self.sessions, &key, frame))?;
         delivery.into_dict(py, &key.channels)
+    }
+
+    /// The plan of a frame, as text for people or as JSON.
+    fn explain(&self, py: Python<'_>, frame: u64, as_json: bool) -> PyResult<String> {
+        let loaded = py.detach(|| self.loaded()).or_input_error()?;
+        let renderer = self.snapshot().source.renderer;
+        py.detach(|| cli::explain(&loaded, renderer.engine()?, frame, as_json))
+            .map_err(|failure| raise(&failure))
+    }
+
+    /// Measured errors of frames beside the predicted ones, as JSON.
+    fn verify(&self, py: Python<'_>, frames: Option<Vec<u64>>, with_pictures: bool) -> PyResult<String> {
+        let sequence = self.sequence(py)?;
+        let renderer = self.snapshot().source.renderer;
+        let report = py.detach(|| {
+            Verification::new(renderer.engine()?, &sequence, frames, with_pictures)?
+                .run::<Failure>(&mut |_| Ok(()))
+        });
+        serde_json::to_string(&report.map_err(|failure| raise(&failure))?).or_run_error()
     }
 
     /// `count` frames from `first` on by `step`, rendered ahead.

@@ -122,6 +122,7 @@ def test_explain_says_what_the_command_line_says(demo: pathlib.Path) -> None:
     assert scenario.explain(7).splitlines()[1:] == run_program(*words).splitlines()[1:]
     report = camsim.verify(scenario, [7])
     assert report["kept"] and report["frames"][0]["frame"] == 7
+    assert report == json.loads(run_program("verify", *words[1:2], "--frames", "7", "--json", *words[4:]))
 
 
 def test_scenarios_travel(pattern: pathlib.Path, monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path) -> None:

@@ -2,7 +2,7 @@
 
 use std::{fmt, io};
 
-use camsim_engine::{GpuError, RenderError};
+use camsim_engine::{GpuError, RenderError, verify::VerifyError};
 
 /// Exit code of success.
 pub const DONE: u8 = 0;
@@ -106,6 +106,18 @@ impl<E: std::error::Error + Send + Sync + 'static> From<RenderError<E>> for Fail
             moving @ RenderError::Moving => Self::bad_input(moving),
             RenderError::Shader(error) => Self::failed(error),
             RenderError::Sink(error) => Self::failed(error),
+        }
+    }
+}
+
+impl From<VerifyError> for Failure {
+    fn from(error: VerifyError) -> Self {
+        match error {
+            VerifyError::Render(error) => error.into(),
+            VerifyError::NoCoords(_) => Self::failed(error),
+            VerifyError::Solver | VerifyError::TooLarge { .. } | VerifyError::Oracle(_) => {
+                Self::bad_input(error)
+            }
         }
     }
 }

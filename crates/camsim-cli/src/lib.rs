@@ -30,6 +30,7 @@ mod render_run;
 mod times_table;
 mod tolerances;
 
+pub use commands::explain::explain;
 use console::Console;
 use failure::Failure;
 

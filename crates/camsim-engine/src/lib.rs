@@ -21,6 +21,7 @@
 //! * [`Engine`]: the renderers of this machine ([`camsim_plan::Backend`]).
 //! * [`Session`]: one sequence.
 //! * [`Finished`]: a frame with its plan and times.
+//! * [`verify`]: measured errors of frames beside the predicted ones.
 
 #![warn(missing_docs)]
 
@@ -34,6 +35,7 @@ mod planner_threads;
 mod prepare_ahead;
 mod session;
 mod truth;
+pub mod verify;
 
 pub use camsim_gpu::{AdapterChoice, GpuContext, GpuError, IdealImages};
 pub use camsim_plan::Backend;

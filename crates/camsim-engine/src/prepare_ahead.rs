@@ -13,7 +13,7 @@ use std::{
 
 use camsim_core::{
     pose::CameraPose,
-    scene::{PlacedMesh, TerrainDetail, TerrainTiles},
+    scene::{PlacedMesh, TerrainTiles},
     temporal::IdealGeometry,
 };
 use camsim_cpu::RowTable;
@@ -106,12 +106,10 @@ impl Preparer {
         if let Some((_, meshes)) = cache().iter().find(|(cached, _)| *cached == view) {
             return meshes.clone();
         }
-        let focal_px = plan.ideal.focal_px.max_element();
         let terrain = self.planner.sequence().scene.terrain.iter();
         let meshes = terrain.flat_map(|terrain| {
             view.poses.iter().map(|pose| {
-                let detail =
-                    TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px);
+                let detail = plan.terrain_detail(terrain, pose);
                 let tiles =
                     self.tiles.as_ref().map_or_else(Vec::new, |tiles| detail.tiles(tiles, view.reads));
                 PlacedMesh { tiles, ..detail.visible_mesh().placed(terrain, base_ned_m(pose)) }

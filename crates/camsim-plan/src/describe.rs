@@ -1,5 +1,6 @@
 //! The plan as text and as JSON, for `camsim explain`.
 
+mod level_of_detail;
 mod passes;
 mod prediction;
 
@@ -15,6 +16,7 @@ use crate::ir::{
     skip::Skip,
     stages::{BlurStage, EdgeStage, PrefilterTaps, RayStage, ShadowStage, TemporalStage},
 };
+pub use level_of_detail::LevelOfDetail;
 use passes::passes;
 use prediction::write_prediction;
 

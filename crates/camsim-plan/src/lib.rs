@@ -46,7 +46,7 @@ pub mod uniforms;
 mod view;
 
 pub use choose::{paper, placement};
-pub use describe::PlanSummary;
+pub use describe::{LevelOfDetail, PlanSummary};
 pub use ir::{
     error_map::{ErrorMap, PixelError, SourceError},
     frame_plan::FramePlan,

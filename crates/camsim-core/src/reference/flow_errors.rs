@@ -4,6 +4,7 @@
 
 use glam::DVec2;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::{
     Oracle, RaySample,
@@ -27,7 +28,7 @@ const COVERAGE_TOLERANCE: f64 = 0.15;
 const STATES: usize = 5;
 
 /// Errors of a set of pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FlowStats {
     /// Pixels whose displacement is known to both.
     pub pixels: u64,
@@ -37,16 +38,17 @@ pub struct FlowStats {
     pub p99: f64,
     /// Largest.
     pub max: f64,
-    /// Pixels with another state, of all that were looked at.
-    pub wrong_states: u64,
-    /// All that were looked at.
+    /// All pixels that were looked at.
     pub looked_at: u64,
+    /// Those of them with another state.
+    pub wrong_states: u64,
 }
 
 /// Errors of a flow, of motion or of a blur path.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FlowErrors {
     /// The plane.
+    #[serde(skip)]
     pub channel: Channel,
     /// Valid pixels of the frame, of which some were looked at.
     pub of_pixels: u64,
@@ -64,7 +66,7 @@ pub struct FlowErrors {
 }
 
 /// Errors of coverages.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CoverageErrors {
     /// Pixels looked at: half of them by chance, and half of those that have less than 1.
     pub pixels: u64,

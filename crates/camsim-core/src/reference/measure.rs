@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::{IdealView, Oracle, RaySample};
 use crate::{
@@ -20,9 +21,10 @@ pub const MAX_VOID_SHARE: f64 = 0.01;
 const MIN_SMOOTH_SHARE: f64 = 0.05;
 
 /// Statistics of source errors, in pixels of the ideal frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ErrorStats {
     /// Number of pixels.
+    #[serde(rename = "pixels")]
     pub count: u64,
     /// Root mean square error.
     pub rms_px: f64,

@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::{FrameView, Oracle, RaySample};
 use crate::frame::RenderedFrame;
@@ -14,7 +15,7 @@ const DIRECTIONS: u32 = 16;
 const RINGS: [f64; 3] = [0.3, 0.65, 1.0];
 
 /// Errors of a frame's depths and points against the oracle, relative to the depth.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TruthErrors {
     /// Pixels that are valid in both.
     pub pixels: u64,
