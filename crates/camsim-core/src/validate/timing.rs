@@ -37,10 +37,15 @@ pub(super) fn check_shutter(check: &mut Check, camera: &CameraSpec) {
     });
 }
 
+/// Time from a frame to the next. A rate that is none, of which its own check tells, leaves all time.
+fn period_ms(camera: &CameraSpec) -> f64 {
+    if camera.fps > 0.0 { 1e3 / camera.fps } else { f64::INFINITY }
+}
+
 /// Checks that a frame is read before the next one begins. A camera by itself has no frame rate that matters.
 fn check_overlap(check: &mut Check, camera: &CameraSpec) {
     let shutter = &camera.shutter;
-    let (readout_ms, period_ms) = (camera.readout_ms(), 1e3 / camera.fps);
+    let (readout_ms, period_ms) = (camera.readout_ms(), period_ms(camera));
     let key = match shutter.line_time_us {
         Some(_) => "camera.shutter.line_time_us",
         None => "camera.shutter.readout_ms",
@@ -65,7 +70,7 @@ fn check_overlap(check: &mut Check, camera: &CameraSpec) {
 pub(super) fn check_timing(check: &mut Check, camera: &CameraSpec) {
     let Some(timing) = &camera.timing else { return };
     let TimingSpec { late_ms, late_stamp, .. } = *timing;
-    let period_ms = 1e3 / camera.fps;
+    let period_ms = period_ms(camera);
     check.require(late_ms < period_ms || late_ms.is_nan(), "camera.timing.late_ms", || {
         format!(
             "must be below a frame's period of {period_ms:.3} ms, not {late_ms}: frames would change places"
@@ -179,6 +184,9 @@ mod tests {
         let found = of_shutter(long.clone());
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].0 == "camera.shutter.readout_ms" && found[0].1.contains("allow_overlap = true"));
+        let backwards =
+            problems(|scenario| (scenario.camera.shutter, scenario.camera.fps) = (long.clone(), -3.0));
+        assert!(matches!(&backwards[..], [(key, _)] if key == "camera.fps"), "{backwards:?}");
         assert_eq!(of_shutter(ShutterSpec { allow_overlap: true, ..long }), []);
         assert_eq!(of_shutter(ShutterSpec { readout_ms: 33.3334, ..ShutterSpec::default() }), []);
         // 480 lines of 80 us.

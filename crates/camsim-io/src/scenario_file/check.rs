@@ -225,8 +225,26 @@ fn type_problem(key: &str, kind: ValueKind, value: &Value) -> Option<String> {
         }
         _ => None,
     };
-    let hint = hint.map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));
+    let hint = match kind {
+        ValueKind::Whole | ValueKind::WholeList if has_too_large(value) => {
+            format!("; whole numbers end at {}", i64::MAX)
+        }
+        _ => hint.map_or(String::new(), |word| format!("; did you mean \"{word}\"?")),
+    };
     Some(format!("expected {text}, found {}{hint}", show(value)))
+}
+
+/// Whether a value has a whole number that TOML has no room for: text on the command line, a decimal in JSON.
+fn has_too_large(value: &Value) -> bool {
+    let is_beyond = |digits: &str| digits.len() > 18 && digits.parse::<i64>().is_err();
+    match value {
+        Value::String(text) => text
+            .split(|c: char| !c.is_ascii_digit() && c != '_')
+            .any(|digits| is_beyond(&digits.replace('_', ""))),
+        Value::Float(number) => number.fract() == 0.0 && *number >= i64::MAX as f64,
+        Value::Array(list) => list.iter().any(has_too_large),
+        _ => false,
+    }
 }
 
 /// The word that was probably meant: of a lens model the one that other programs call so, else the most similar.

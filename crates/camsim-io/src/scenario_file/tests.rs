@@ -164,6 +164,11 @@ fn errors_name_file_line_and_key() {
         ),
         ("[[camera.zoom]]\nat = 1\nfocal_px = [1, 0]", "dir/s.toml:8: camera.zoom.0.focal_px: must be"),
         ("[camera", "dir/s.toml:6: not valid TOML"),
+        (
+            "[output]\nx = 18446744073709551615",
+            "s.toml:7: not valid TOML: whole numbers end at 9223372036854775807",
+        ),
+        ("[output]\nx = -99999999999999999999", "s.toml:7: not valid TOML: whole numbers end at"),
         ("[camera.shutter]\nexposure_ms = 8,0", "; decimals have a point"),
         ("[camera]\ncamera = \"c.toml\"", "`camera` stands outside of all tables: move the line above"),
         ("[camera.lens]\nmodel = \"equidistant\"", "did you mean \"kannala-brandt\"?"),
@@ -214,6 +219,28 @@ fn set_changes_keys_before_they_are_checked() {
         ("seed.x", "3", "--set seed.x=3: seed: expected a whole number, 0 or more, found a table"),
         ("flight.log.x", "3", "is not a table"),
         ("camera.fps", "1\nseed = 2", "expected a number"),
+        (
+            "seed",
+            "18446744073709551616",
+            "whole number, 0 or more, found \"18446744073709551616\"; whole numbers end at 9223372036854775807",
+        ),
+        (
+            "camera.timing.drop",
+            "[1, 99999999999999999999]",
+            "list of whole numbers, 0 or more, found \"[1, 99999999999999999999]\"; whole numbers end at",
+        ),
+        (
+            "imu.rate_hz",
+            "100",
+            "--set imu.rate_hz=100: there is no [[imu]]: add one to the file, or write the whole list, imu=[{ name = \
+             \"imu0\", rate_hz = 100 }]",
+        ),
+        ("imu.left.mount.angles_deg", "[1, 2, 3]", "imu=[{ name = \"left\", mount.angles_deg = [1, 2, 3] }]"),
+        (
+            "camera.zoom.0.at",
+            "2.0",
+            "no [[camera.zoom]]: add one to the file, or write the whole list, camera.zoom=[{ at",
+        ),
     ] {
         let error = with(&[(key, value)]).unwrap_err().to_string();
         assert!(error.contains(expected), "{key}={value} gives {error}");

@@ -14,7 +14,7 @@ use toml::{
 use super::{
     ScenarioError,
     escapes::{backslash_advice, with_slashes},
-    schema::{CAMERAS, keys},
+    schema::{CAMERAS, SCENARIO, ValueKind, find_key, keys},
     wrong_file_kind::wrong_kind_message,
 };
 
@@ -22,6 +22,9 @@ mod cameras;
 
 /// Text in place of a value that takes the key out, so that its default holds. No shell can pass it.
 pub const UNSET: &str = "\0";
+
+/// What the parser says of whole numbers beyond those of TOML, by how far they are.
+const TOO_LARGE: [&str; 4] = ["u64 value was too large", "as i128", "as u128", "number overflowed"];
 
 /// Characters of a value that messages show.
 const SHOWN: usize = 120;
@@ -137,7 +140,13 @@ impl Tree {
         let syntax = |error: toml::de::Error| {
             let line = error.span().map_or(1, |span| line_of(span.start));
             let hint = syntax_hint(path, text.lines().nth(line - 1).unwrap_or_default());
-            ScenarioError::Syntax { path: path.into(), line, message: format!("{}{hint}", error.message()) }
+            let message = match error.message() {
+                message if TOO_LARGE.iter().any(|part| message.contains(part)) => {
+                    format!("whole numbers end at {}", i64::MAX)
+                }
+                message => format!("{message}{hint}"),
+            };
+            ScenarioError::Syntax { path: path.into(), line, message }
         };
         let spanned = DeTable::parse(text).map_err(syntax)?;
         let root: Table = toml::from_str(text).map_err(syntax)?;
@@ -219,6 +228,9 @@ impl Tree {
         if let Some(camera) = key.strip_prefix("cameras.").and_then(|index| index.parse().ok()) {
             return self.put_camera(camera, value, location);
         }
+        if let Some(advice) = self.missing_list(key, &value) {
+            return Err(fail(advice));
+        }
         let parents = key.match_indices('.').map(|(end, _)| &key[..end]);
         let new_tables: Vec<&str> = parents.filter(|parent| !self.has(parent)).collect();
         *slot(&mut self.root, key, fail)? = value;
@@ -229,6 +241,38 @@ impl Tree {
         }
         self.locations.insert(key.into(), location.clone());
         if ["camera", CAMERAS].contains(&key) { self.resolve_cameras() } else { Ok(()) }
+    }
+
+    /// What to write in place of a key within a list of tables that is not there; `None` if no list is missing.
+    fn missing_list(&self, key: &str, value: &Value) -> Option<String> {
+        let known = |key: &str| {
+            let steps: Vec<&str> = key.split('.').filter(|step| step.parse::<usize>().is_err()).collect();
+            find_key(&steps.join("."))
+        };
+        let mut parents = key.match_indices('.').map(|(end, _)| &key[..end]);
+        let list = parents.find(|parent| {
+            !self.has(parent) && known(parent).is_some_and(|key| key.field.kind == ValueKind::Tables)
+        })?;
+        let below = &key[list.len() + 1..];
+        let (name, own) = match below.split_once('.') {
+            Some((name, own)) if known(&join(list, below)).is_none() => (name.to_owned(), own),
+            _ => (format!("{}0", list.rsplit('.').next().unwrap_or(list)), below),
+        };
+        let own = own.trim_start_matches(|c: char| c.is_ascii_digit()).trim_start_matches('.');
+        let needs_name = SCENARIO.required.iter().any(|(required, _)| *required == join(list, "name"));
+        let name = if needs_name { format!("name = \"{name}\", ") } else { String::new() };
+        Some(format!(
+            "there is no [[{list}]]: add one to the file, or write the whole list, {list}=[{{ {name}{own} = {value} }}]"
+        ))
+    }
+
+    /// A key of `--set` with numbers in place of the names of cameras and of other elements of lists.
+    pub(super) fn numbered(&self, key: &str) -> Result<String, String> {
+        let key = self.with_camera_number(key)?;
+        key.split('.').try_fold(String::new(), |above, step| match get(&self.root, &above) {
+            Some(Value::Array(list)) => Ok(join(&above, &number_of(list, step, &above)?)),
+            _ => Ok(join(&above, step)),
+        })
     }
 
     /// The value at a dotted key.
@@ -245,6 +289,22 @@ impl Tree {
     fn forget_below(&mut self, key: &str) {
         let below = format!("{key}.");
         self.locations.retain(|key, _| !key.starts_with(&below));
+    }
+}
+
+/// The number of an element of a list of tables, which may be its name.
+fn number_of(list: &[Value], step: &str, key: &str) -> Result<String, String> {
+    let names = || list.iter().filter_map(|element| element.get("name")?.as_str());
+    let position = list.iter().position(|element| element.get("name").and_then(Value::as_str) == Some(step));
+    match position {
+        Some(position) => Ok(position.to_string()),
+        None if step.parse::<usize>().is_ok() || names().next().is_none() => Ok(step.to_owned()),
+        None => {
+            let names = names().collect::<Vec<_>>().join(", ");
+            Err(format!(
+                "there is no `{step}` in [[{key}]], which has {names}; name one, or its number from 0"
+            ))
+        }
     }
 }
 

@@ -41,3 +41,21 @@ fn sensors_are_read_and_their_problems_named_by_line() {
         assert!(error.contains(wanted), "{error}");
     }
 }
+
+#[test]
+fn elements_of_lists_are_changed_by_name() {
+    let text = format!("{GOOD}[[imu]]\nname = \"a\"\n[[imu]]\nname = \"b\"\n");
+    let set = |key: &str| {
+        let sets = [(key.to_owned(), "100".to_owned())];
+        parse_scenario(&text, Path::new("dir/s.toml"), &sets)
+    };
+    for key in ["imu.b.rate_hz", "imu.1.rate_hz"] {
+        let rates: Vec<f64> = set(key).unwrap().imu.iter().map(|imu| imu.rate_hz).collect();
+        assert_eq!(rates, [200.0, 100.0], "{key}");
+    }
+    let error = set("imu.c.rate_hz").unwrap_err().to_string();
+    assert!(
+        error.contains("there is no `c` in [[imu]], which has a, b; name one, or its number from 0"),
+        "{error}"
+    );
+}

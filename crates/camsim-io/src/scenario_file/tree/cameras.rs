@@ -103,7 +103,7 @@ impl Tree {
     }
 
     /// A key of `--set` with the number of a camera in place of its name.
-    pub(in super::super) fn numbered(&self, key: &str) -> Result<String, String> {
+    pub(super) fn with_camera_number(&self, key: &str) -> Result<String, String> {
         let mut steps = key.splitn(3, '.');
         let (first, camera, rest) = (steps.next(), steps.next(), steps.next());
         let has_list = self.root.contains_key(CAMERAS);
