@@ -40,11 +40,31 @@ struct TimedSession<'a> {
     ms: Vec<f64>,
 }
 
-// Long because: a list of cases and their figures.
 pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
     let mut report = ExperimentReport::default();
+    let mut variants = variants(setup)?;
+    measure(&mut variants)?;
+    let ms: Vec<f64> = variants.iter().map(|variant| quantile(&variant.ms, 0.5)).collect();
+    report.notes.push(format!(
+        "Renderer: {}. {}x{} pixels, read back, nothing encoded; medians of {} bursts of {BURST} frames, all \
+         variants in turn. The paper: more than 33 frames/s with 100 samples on a GeForce 940MX. \"Reference \
+         program\": the paper's published code, measured at 640x480 with the same scene on Mesa's software \
+         adapter with two cores, so it compares with such a machine only. camsim takes as many samples as \
+         its tolerance needs, whatever the row says.",
+        setup.engine,
+        setup.width_px,
+        setup.width_px * 3 / 4,
+        variants[0].ms.len(),
+    ));
+    report.tables.push(("speed", table(&ms)));
+    report.plots.push(("speed", plot(&ms)));
+    Ok(report)
+}
+
+/// A session for each case by each of camsim's three: the paper's preset, the default, and the default without rays
+/// at silhouettes.
+fn variants<'a>(setup: &Setup<'a>) -> Result<Vec<TimedSession<'a>>, ReproduceError> {
     let scene = test_bench::target(setup, TARGET_M)?;
-    // The rotation of the measurements of the paper's program.
     let mut variants = Vec::new();
     for (_, lens, readout_ms, exposure_ms, samples, _) in CASES {
         for (preset, silhouettes) in
@@ -57,6 +77,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
                 shutter: ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() },
                 ..camera
             };
+            // The rotation of the measurements of the paper's program.
             let mut sequence = (*test_bench::sequence(camera, Motion::turning(), &scene)?).clone();
             sequence.scenario.quality.preset = preset;
             if !silhouettes {
@@ -71,6 +92,11 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
             variants.push(TimedSession { session, ms: Vec::new() });
         }
     }
+    Ok(variants)
+}
+
+/// Times all variants in turn, each round beginning with another.
+fn measure(variants: &mut [TimedSession<'_>]) -> Result<(), ReproduceError> {
     let begin = Instant::now();
     for round in 0..ROUNDS {
         if round > 0 && begin.elapsed() > BUDGET {
@@ -84,18 +110,10 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
             variant.ms.push(1e3 * begin.elapsed().as_secs_f64() / BURST as f64);
         }
     }
-    let ms: Vec<f64> = variants.iter().map(|variant| quantile(&variant.ms, 0.5)).collect();
-    report.notes.push(format!(
-        "Renderer: {}. {}x{} pixels, read back, nothing encoded; medians of {} bursts of {BURST} frames, all \
-         variants in turn. The paper: more than 33 frames/s with 100 samples on a GeForce 940MX. \"Reference \
-         program\": the paper's published code, measured at 640x480 with the same scene on Mesa's software \
-         adapter with two cores, so it compares with such a machine only. camsim takes as many samples as \
-         its tolerance needs, whatever the row says.",
-        setup.engine,
-        setup.width_px,
-        setup.width_px * 3 / 4,
-        variants[0].ms.len(),
-    ));
+    Ok(())
+}
+
+fn table(ms: &[f64]) -> Table {
     let mut table = Table::new(
         "Time a frame, ms",
         &[
@@ -123,33 +141,32 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
             format!("{:.1}", 1e3 / plain),
         ]);
     }
-    report.tables.push(("speed", table));
+    table
+}
+
+fn plot(ms: &[f64]) -> Plot {
     let series = |name: &str, first: usize| Series {
         name: name.into(),
         points: ms.iter().skip(first).step_by(3).enumerate().map(|(k, ms)| (k as f64 + 1.0, *ms)).collect(),
         joined: true,
     };
     let reference = CASES.iter().enumerate().map(|(k, case)| (k as f64 + 1.0, case.5)).collect();
-    report.plots.push((
-        "speed",
-        Plot {
-            title: "Time a frame by case".into(),
-            x_label: "case, as in the table".into(),
-            y_label: "ms a frame".into(),
-            log: [false, false],
-            series: vec![
-                series("paper preset", 0),
-                series("camsim", 1),
-                series("camsim without silhouette rays", 2),
-                Series {
-                    name: "reference program (software adapter, two cores)".into(),
-                    points: reference,
-                    joined: false,
-                },
-            ],
-        },
-    ));
-    Ok(report)
+    Plot {
+        title: "Time a frame by case".into(),
+        x_label: "case, as in the table".into(),
+        y_label: "ms a frame".into(),
+        log: [false, false],
+        series: vec![
+            series("paper preset", 0),
+            series("camsim", 1),
+            series("camsim without silhouette rays", 2),
+            Series {
+                name: "reference program (software adapter, two cores)".into(),
+                points: reference,
+                joined: false,
+            },
+        ],
+    }
 }
 
 fn render_burst(session: &mut Session<'_>, round: u64) -> Result<(), ReproduceError> {
