@@ -29,14 +29,15 @@
 //! | [`core`] | scenario, trajectory, lens, scene: the mathematics in f64, and the reference renderer |
 //! | [`io`] | files in, files out |
 //! | [`plan`] | what each frame takes, and the error that it leaves |
-//! | [`engine`] | renders sequences, by [`cpu`] and [`gpu`] |
+//! | [`engine`] | renders sequences, by [`cpu`] and `gpu` |
 //! | [`cli`] | the command line |
-//! | `lab`, `viewer` | experiments and the viewer, with the features of these names |
+//! | `gpu`, `lab`, `viewer` | the renderer on wgpu, experiments and the viewer, with the features of these names |
 
 pub use camsim_cli as cli;
 pub use camsim_core as core;
 pub use camsim_cpu as cpu;
 pub use camsim_engine as engine;
+#[cfg(feature = "gpu")]
 pub use camsim_gpu as gpu;
 pub use camsim_io as io;
 #[cfg(feature = "lab")]

@@ -10,8 +10,18 @@ use std::{
 /// The crates with several modules.
 const CRATES: [&str; 9] = ["scenario", "core", "plan", "cpu", "gpu", "engine", "lab", "cli", "viewer"];
 /// Layers of the planner, from the lowest to the highest.
-const LAYERS: [&str; 9] =
-    ["ir", "view", "source_error", "picture_error", "choose", "planner", "tracks", "uniforms", "describe"];
+const LAYERS: [&str; 10] = [
+    "ir",
+    "view",
+    "source_error",
+    "picture_error",
+    "choose",
+    "planner",
+    "tracks",
+    "uniforms",
+    "adapter",
+    "describe",
+];
 const MOST_LINES_OF_FILE: usize = 400;
 const MOST_LINES_OF_FUNCTION: usize = 60;
 /// In a function that is longer than that, before its reason.

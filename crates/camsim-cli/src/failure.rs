@@ -104,7 +104,6 @@ impl<E: std::error::Error + Send + Sync + 'static> From<RenderError<E>> for Fail
             RenderError::Gpu(error) => error.into(),
             RenderError::Plan(error) => Self::bad_input(error),
             moving @ RenderError::Moving => Self::bad_input(moving),
-            RenderError::Shader(error) => Self::failed(error),
             RenderError::Sink(error) => Self::failed(error),
         }
     }

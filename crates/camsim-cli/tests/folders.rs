@@ -415,7 +415,7 @@ fn interrupted_run_reports_progress_and_resume_command() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn unknown_adapter_lists_available_ones() {
     let base = tempfile::tempdir().unwrap();
-    let adapters = camsim_gpu::context::adapters(camsim_engine::AdapterChoice::Best);
+    let adapters = camsim_engine::adapters(camsim_engine::AdapterChoice::Best);
     let (code, err) =
         wait(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
     assert!(

@@ -3,8 +3,11 @@
 use std::{fmt, sync::Arc};
 
 use camsim_core::{scenario::Channel, sequence::Sequence};
-use camsim_gpu::{AdapterChoice, GpuContext, GpuError};
-use camsim_plan::{AdapterClass, Backend, Capabilities};
+use camsim_plan::{
+    AdapterClass, Backend, Capabilities,
+    adapter::{Adapter, AdapterChoice, AdapterLimits, AdapterSummary, GpuError},
+    uniforms::Truth,
+};
 
 use crate::{RenderError, Session};
 
@@ -14,7 +17,7 @@ const CPU_MAX_SIDE_PX: u32 = 16_384;
 /// The opened adapter, if any, and the renderers that may be used.
 #[derive(Debug)]
 pub struct Engine {
-    gpu: Option<GpuContext>,
+    gpu: Option<Box<dyn Adapter>>,
     backend: Backend,
     /// The class that plans are made for, if it is not the adapter's own.
     planned_class: Option<AdapterClass>,
@@ -26,7 +29,7 @@ impl Engine {
     /// # Errors
     /// There is no usable adapter.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
-        Ok(Self { gpu: Some(GpuContext::new(choice)?), backend: automatic(), planned_class: None })
+        Ok(Self { gpu: Some(open_adapter(choice)?), backend: automatic(), planned_class: None })
     }
 
     /// The cpu renderer alone, without opening an adapter or loading a driver.
@@ -49,15 +52,27 @@ impl Engine {
                 opened => opened,
             },
             Backend::Gpu | Backend::GpuThenCpu => {
-                Ok(Self { gpu: Some(GpuContext::new(AdapterChoice::Best)?), backend, planned_class: None })
+                Ok(Self { gpu: Some(open_adapter(AdapterChoice::Best)?), backend, planned_class: None })
             }
         }
     }
 
     /// The opened adapter.
     #[must_use]
-    pub fn gpu(&self) -> Option<&GpuContext> {
-        self.gpu.as_ref()
+    pub fn adapter(&self) -> Option<&dyn Adapter> {
+        self.gpu.as_deref()
+    }
+
+    /// The opened adapter, with its wgpu device.
+    #[cfg(feature = "gpu")]
+    #[must_use]
+    pub fn gpu(&self) -> Option<&camsim_gpu::GpuContext> {
+        let adapter: &dyn std::any::Any = self.adapter()?;
+        adapter.downcast_ref()
+    }
+
+    fn limits(&self) -> Option<AdapterLimits> {
+        self.adapter().map(Adapter::limits)
     }
 
     /// Tiles textures with longer sides in new sessions, as if the adapter had this limit: for tests, and for
@@ -67,7 +82,7 @@ impl Engine {
     }
 
     /// Sets the number of pixels of a row per thread of the gpu's reverse kernel
-    /// ([`GpuContext::set_pixels_per_thread`]) in new sessions.
+    /// ([`Adapter::set_pixels_per_thread`]) in new sessions.
     pub fn set_pixels_a_thread(&mut self, pixels: u32) {
         self.gpu.iter_mut().for_each(|gpu| gpu.set_pixels_per_thread(pixels));
     }
@@ -86,34 +101,35 @@ impl Engine {
     /// Capabilities of this machine, which plans depend on.
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
-        let class = |gpu: &GpuContext| match gpu.is_software() {
+        let limits = self.limits();
+        let class = |limits: AdapterLimits| match limits.is_software {
             true => AdapterClass::Software,
             false => AdapterClass::Card,
         };
-        let adapter = self.gpu.as_ref().map(|gpu| self.planned_class.unwrap_or(class(gpu)));
+        let adapter = limits.map(|limits| self.planned_class.unwrap_or(class(limits)));
         Capabilities {
             backend: self.backend,
             adapter,
             has_vectors: camsim_cpu::suits_processor(),
-            max_picture_px: self.gpu.as_ref().map_or(u32::MAX, GpuContext::max_picture_px),
+            max_picture_px: limits.map_or(u32::MAX, |limits| limits.max_picture_px),
         }
     }
 
     /// Largest side of an ideal frame, px.
     #[must_use]
     pub fn max_side_px(&self) -> u32 {
-        self.gpu.as_ref().map_or(CPU_MAX_SIDE_PX, GpuContext::max_side_px)
+        self.limits().map_or(CPU_MAX_SIDE_PX, |limits| limits.max_side_px)
     }
 
     /// Largest number of pixels of an output frame with depth and coordinates.
     #[must_use]
     pub fn most_pixels_with_truth(&self) -> u64 {
-        self.gpu.as_ref().map_or(u64::MAX, GpuContext::max_pixels_with_truth)
+        self.limits().map_or(u64::MAX, |limits| limits.max_storage_bytes / size_of::<Truth>() as u64)
     }
 
     /// Whether frames are rendered on the processor that also plans them.
     pub(crate) fn shares_processor(&self) -> bool {
-        self.gpu.as_ref().is_none_or(GpuContext::is_software)
+        self.limits().is_none_or(|limits| limits.is_software)
     }
 
     /// Opens a session for a sequence, and uploads its scene if an adapter is open.
@@ -127,6 +143,26 @@ impl Engine {
     ) -> Result<Session<'_>, RenderError<E>> {
         Session::new(self, sequence, channels).map_err(RenderError::lift)
     }
+}
+
+#[cfg(feature = "gpu")]
+fn open_adapter(choice: AdapterChoice) -> Result<Box<dyn Adapter>, GpuError> {
+    Ok(Box::new(camsim_gpu::GpuContext::new(choice)?))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn open_adapter(_: AdapterChoice) -> Result<Box<dyn Adapter>, GpuError> {
+    Err(GpuError::NotBuilt)
+}
+
+/// All adapters of this machine, the preferred one first; none without the feature `gpu`.
+#[must_use]
+#[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "there are none to choose from"))]
+pub fn adapters(choice: AdapterChoice) -> Vec<AdapterSummary> {
+    #[cfg(feature = "gpu")]
+    return camsim_gpu::context::adapters(choice);
+    #[cfg(not(feature = "gpu"))]
+    Vec::new()
 }
 
 /// The gpu if `CAMSIM_SHADER_DIR` names shader files to try, otherwise automatic.
@@ -143,11 +179,13 @@ impl fmt::Display for Engine {
         let threads = rayon::current_num_threads();
         match (&self.gpu, self.backend) {
             (None, _) | (_, Backend::Cpu) => write!(f, "cpu ({threads} threads)"),
-            (Some(gpu), Backend::Auto) if gpu.is_software() && camsim_cpu::suits_processor() => {
-                write!(f, "cpu ({threads} threads); {} for what the cpu does not vectorise", gpu.adapter)
+            (Some(gpu), Backend::Auto) if gpu.limits().is_software && camsim_cpu::suits_processor() => {
+                write!(f, "cpu ({threads} threads); {} for what the cpu does not vectorise", gpu.summary())
             }
-            (Some(gpu), Backend::GpuThenCpu) => write!(f, "ideal frames {}, output frames cpu", gpu.adapter),
-            (Some(gpu), _) => write!(f, "{}", gpu.adapter),
+            (Some(gpu), Backend::GpuThenCpu) => {
+                write!(f, "ideal frames {}, output frames cpu", gpu.summary())
+            }
+            (Some(gpu), _) => write!(f, "{}", gpu.summary()),
         }
     }
 }

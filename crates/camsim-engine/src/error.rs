@@ -1,7 +1,6 @@
 //! Errors of rendering.
 
-use camsim_gpu::{GpuError, PassError};
-use camsim_plan::PlanError;
+use camsim_plan::{PlanError, adapter::GpuError};
 
 /// Errors of rendering; `E` is the error of the sink.
 #[derive(Debug, thiserror::Error)]
@@ -12,9 +11,6 @@ pub enum RenderError<E: std::error::Error + 'static> {
     /// Planning failed.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The shader files are invalid.
-    #[error(transparent)]
-    Shader(#[from] camsim_gpu::shaders::ComposeError),
     /// The paper's methods do not show things that move.
     #[error(
         "scene.gltf.motion: quality.preset = \"paper\" has no method for things that move: write preset = \
@@ -29,22 +25,12 @@ pub enum RenderError<E: std::error::Error + 'static> {
 /// Errors of functions without a sink.
 pub(crate) type RenderErrorBase = RenderError<std::convert::Infallible>;
 
-impl<E: std::error::Error + 'static> From<PassError> for RenderError<E> {
-    fn from(error: PassError) -> Self {
-        match error {
-            PassError::Gpu(error) => Self::Gpu(error),
-            PassError::Shader(error) => Self::Shader(error),
-        }
-    }
-}
-
 impl<E: std::error::Error + 'static> RenderError<E> {
     /// Converts the error to that of a function with a sink.
     pub(crate) fn lift(base: RenderErrorBase) -> Self {
         match base {
             RenderError::Gpu(error) => Self::Gpu(error),
             RenderError::Plan(error) => Self::Plan(error),
-            RenderError::Shader(error) => Self::Shader(error),
             RenderError::Moving => RenderError::Moving,
             RenderError::Sink(never) => match never {},
         }

@@ -6,11 +6,9 @@ use camsim_core::{
     pose::CameraPose,
     scene::LodSelection,
 };
-use camsim_plan::{FramePlan, uniforms::Truth};
+use camsim_plan::{FramePlan, adapter::PassTime, uniforms::Truth};
 use glam::DVec2;
 use rayon::prelude::*;
-
-use camsim_gpu::recorder::PassTime;
 
 /// Times of the stages of a frame, ms. Frames overlap: while the program waits for one, the gpu may still
 /// work on the one before.

@@ -37,9 +37,13 @@ mod session;
 mod truth;
 pub mod verify;
 
-pub use camsim_gpu::{AdapterChoice, GpuContext, GpuError, IdealImages};
-pub use camsim_plan::Backend;
-pub use engine::Engine;
+#[cfg(feature = "gpu")]
+pub use camsim_gpu::GpuContext;
+pub use camsim_plan::{
+    Backend,
+    adapter::{AdapterChoice, AdapterSummary, GpuError, IdealImages},
+};
+pub use engine::{Engine, adapters};
 pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
 pub use lane::join_parts;

@@ -11,12 +11,12 @@ use camsim_core::{
     sequence::Sequence,
 };
 use camsim_cpu::{CpuRenderer, IdealBuffer, IdealTexels, ReverseInputs};
-use camsim_gpu::{
-    GpuError, GpuJob, GpuSession, IdealImages, Readback, Submitted,
-    session::{FRAMES_IN_FLIGHT, IdealCopy},
-};
 use camsim_plan::{
     FramePlan, PixelHit, PlanError, Planner, Renderer,
+    adapter::{
+        AdapterSession, CopiedIdeal, FRAMES_IN_FLIGHT, GpuError, GpuJob, IdealCopy, IdealImages, Readback,
+        Submitted,
+    },
     uniforms::{FrameUniforms, Truth, frame_uniforms},
 };
 
@@ -41,7 +41,7 @@ pub struct Session<'a> {
     /// One, or one a face.
     lanes: Vec<Lane>,
     cpu: CpuRenderer,
-    gpu: Option<GpuSession<'a>>,
+    gpu: Option<Box<dyn AdapterSession + 'a>>,
     coords_phase: f32,
     channels: Vec<Channel>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
@@ -90,8 +90,8 @@ impl<'a> Session<'a> {
         let planner = Arc::new(planner.with_capabilities(engine.capabilities()));
         let meshes = Arc::new(SceneBatches::new(&still.scene));
         let gpu = engine
-            .gpu()
-            .map(|gpu| GpuSession::new(gpu, &still, meshes.clone(), planner.wants_truth()))
+            .adapter()
+            .map(|adapter| adapter.session(&still, meshes.clone(), planner.wants_truth()))
             .transpose()?;
         let Scenario { camera, seed, .. } = &still.scenario;
         let optics = Optics::new(camera, *seed);
@@ -179,13 +179,13 @@ impl<'a> Session<'a> {
 
     /// Measures the time of each gpu pass from now on; `false` without a gpu or without time stamps.
     pub fn time_passes(&mut self) -> bool {
-        self.gpu.as_mut().is_some_and(GpuSession::time_passes)
+        self.gpu.as_mut().is_some_and(|gpu| gpu.time_passes())
     }
 
     /// Clears the caches of plans and ideal frames. Pictures stay the same. For benchmarks, which render the
     /// same frames over and over.
     pub fn forget(&mut self) {
-        self.gpu.iter_mut().for_each(GpuSession::forget);
+        self.gpu.iter_mut().for_each(|gpu| gpu.forget());
         self.lanes.iter_mut().for_each(|lane| lane.ideal = None);
         self.planner.forget();
     }
@@ -200,7 +200,7 @@ impl<'a> Session<'a> {
         frames: impl IntoIterator<Item = u64>,
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
-        let tiles = self.gpu.as_ref().and_then(GpuSession::tiles);
+        let tiles = self.gpu.as_ref().and_then(|gpu| gpu.tiles());
         let lanes = self.lanes.len();
         let preparer = |lane| Preparer::new(self.planner.clone(), lane, tiles.clone());
         let preparers: Vec<Preparer> = (0..lanes).map(preparer).collect();
@@ -337,17 +337,15 @@ impl<'a> Session<'a> {
         let begin = Instant::now();
         let (color_rgba, truth) = match (&source, &self.gpu) {
             (IdealSource::Cpu(buffer), _) => self.cpu.reverse(&inputs, *buffer),
-            (IdealSource::Copied(_, copy), Some(gpu)) => gpu
-                .with_copy(*copy, |ideal| {
-                    let texels = IdealTexels {
-                        color: ideal.color,
-                        color_stride: ideal.color_stride,
-                        depth: ideal.depth,
-                        depth_stride: ideal.depth_stride,
-                    };
-                    self.cpu.reverse_from(&inputs, texels)
-                })?
-                .ok_or_else(|| GpuError::Device("a copied ideal frame of a plan without poses".into()))?,
+            (IdealSource::Copied(_, copy), Some(gpu)) => {
+                let mut made = None;
+                gpu.with_copy(*copy, &mut |ideal| {
+                    let CopiedIdeal { color, color_stride, depth, depth_stride } = ideal;
+                    let texels = IdealTexels { color, color_stride, depth, depth_stride };
+                    made = self.cpu.reverse_from(&inputs, texels);
+                })?;
+                made.ok_or_else(|| GpuError::Device("a copied ideal frame of a plan without poses".into()))?
+            }
             (IdealSource::Gpu(submitted), Some(gpu)) => gpu.output(submitted)?,
             (_, None) => return Err(GpuError::NoAdapter(String::new()).into()),
         };
@@ -472,18 +470,18 @@ impl<'a> Session<'a> {
     }
 
     /// Number of terrain triangles near edge marks, which are drawn with several samples per pixel
-    /// ([`GpuSession::triangles_near_edges`]); `None` before the first frame and without a gpu.
+    /// ([`AdapterSession::triangles_near_edges`]); `None` before the first frame and without a gpu.
     ///
     /// # Errors
     /// Faults of the adapter.
     pub fn triangles_near_marks(&self) -> Result<Option<u64>, GpuError> {
-        self.gpu.as_ref().map_or(Ok(None), GpuSession::triangles_near_edges)
+        self.gpu.as_ref().map_or(Ok(None), |gpu| gpu.triangles_near_edges())
     }
 
     /// Number of terrain texture tiles on the gpu, and of all tiles; `None` if the texture is not tiled.
     #[must_use]
     pub fn tiles_held(&self) -> Option<[usize; 2]> {
-        self.gpu.as_ref().and_then(GpuSession::resident_tiles)
+        self.gpu.as_ref().and_then(|gpu| gpu.resident_tiles())
     }
 }
 

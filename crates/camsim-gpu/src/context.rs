@@ -2,23 +2,23 @@
 
 use std::sync::{Arc, LazyLock, Mutex};
 
+use camsim_core::{scene::SceneBatches, sequence::Sequence};
+
 use crate::{
-    adapter::{AdapterChoice, AdapterSummary, GpuError},
-    layout::Truth,
+    adapter::{Adapter, AdapterChoice, AdapterLimits, AdapterSession, AdapterSummary, GpuError},
+    session::GpuSession,
 };
 
-impl AdapterSummary {
-    fn of(info: &wgpu::AdapterInfo) -> Self {
-        let kind = match info.device_type {
-            wgpu::DeviceType::DiscreteGpu => "discrete",
-            wgpu::DeviceType::IntegratedGpu => "integrated",
-            wgpu::DeviceType::VirtualGpu => "virtual",
-            wgpu::DeviceType::Cpu => "software",
-            wgpu::DeviceType::Other => "other",
-        };
-        let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
-        Self { name: info.name.clone(), kind, backend: format!("{:?}", info.backend), driver }
-    }
+fn summary_of(info: &wgpu::AdapterInfo) -> AdapterSummary {
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => "discrete",
+        wgpu::DeviceType::IntegratedGpu => "integrated",
+        wgpu::DeviceType::VirtualGpu => "virtual",
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::Other => "other",
+    };
+    let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
+    AdapterSummary { name: info.name.clone(), kind, backend: format!("{:?}", info.backend), driver }
 }
 
 /// Pixels per thread of the reverse kernel on a software adapter: reading a line's poses costs llvmpipe up to
@@ -67,7 +67,7 @@ static INSTANCE: LazyLock<wgpu::Instance> = LazyLock::new(|| {
 /// All adapters of this machine, the preferred one first.
 #[must_use]
 pub fn adapters(choice: AdapterChoice) -> Vec<AdapterSummary> {
-    ranked_adapters(choice).iter().map(|adapter| AdapterSummary::of(&adapter.get_info())).collect()
+    ranked_adapters(choice).iter().map(|adapter| summary_of(&adapter.get_info())).collect()
 }
 
 /// Error for an empty list of adapters.
@@ -75,7 +75,7 @@ fn no_adapter_error(choice: AdapterChoice) -> GpuError {
     let Ok(wanted_name) = std::env::var("CAMSIM_ADAPTER") else { return GpuError::NoAdapter(String::new()) };
     let available: Vec<String> = adapters_named(choice, None)
         .iter()
-        .map(|adapter| AdapterSummary::of(&adapter.get_info()).to_string())
+        .map(|adapter| summary_of(&adapter.get_info()).to_string())
         .collect();
     if available.is_empty() {
         return GpuError::NoAdapter(format!(" with CAMSIM_ADAPTER={wanted_name}"));
@@ -142,7 +142,7 @@ impl GpuContext {
         }
         let adapter = candidates.remove(0);
         let info = adapter.get_info();
-        let summary = AdapterSummary::of(&info);
+        let summary = summary_of(&info);
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("camsim"),
             // Time stamps serve measurements only.
@@ -161,36 +161,6 @@ impl GpuContext {
         let pixels_per_thread = if is_software { SOFTWARE_PIXELS_PER_THREAD } else { 1 };
         let fault = record_faults(&device);
         Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_per_thread, fault })
-    }
-
-    /// Whether the adapter is a driver that runs on this machine's processor.
-    #[must_use]
-    pub fn is_software(&self) -> bool {
-        self.is_software
-    }
-
-    /// Largest side of a texture that is not split into tiles, pixels.
-    #[must_use]
-    pub fn max_picture_px(&self) -> u32 {
-        self.max_picture_px
-    }
-
-    /// Splits textures with longer sides into tiles, as if this were the adapter's limit: for tests, and
-    /// where device memory is short.
-    pub fn limit_pictures(&mut self, max_side_px: u32) {
-        self.max_picture_px = max_side_px.min(self.max_side_px());
-    }
-
-    /// Sets the pixels of a row per thread of the reverse kernel, 1 to 4096. The default is 16 on a software
-    /// adapter and 1 on a card. The output does not depend on it.
-    pub fn set_pixels_per_thread(&mut self, pixels: u32) {
-        self.pixels_per_thread = pixels.clamp(1, 4096);
-    }
-
-    /// Maximum number of pixels of an output frame with depth and coordinates.
-    #[must_use]
-    pub fn max_pixels_with_truth(&self) -> u64 {
-        self.max_storage_bytes() / size_of::<Truth>() as u64
     }
 
     /// Fails if the device has reported an error.
@@ -233,5 +203,37 @@ impl GpuContext {
             limit,
             fix,
         })
+    }
+}
+
+impl Adapter for GpuContext {
+    fn summary(&self) -> &AdapterSummary {
+        &self.adapter
+    }
+
+    fn limits(&self) -> AdapterLimits {
+        AdapterLimits {
+            is_software: self.is_software,
+            max_picture_px: self.max_picture_px,
+            max_side_px: self.max_side_px(),
+            max_storage_bytes: self.max_storage_bytes(),
+        }
+    }
+
+    fn limit_pictures(&mut self, max_side_px: u32) {
+        self.max_picture_px = max_side_px.min(self.max_side_px());
+    }
+
+    fn set_pixels_per_thread(&mut self, pixels: u32) {
+        self.pixels_per_thread = pixels.clamp(1, 4096);
+    }
+
+    fn session<'a>(
+        &'a self,
+        sequence: &Sequence,
+        meshes: Arc<SceneBatches>,
+        truth: bool,
+    ) -> Result<Box<dyn AdapterSession + 'a>, GpuError> {
+        Ok(Box::new(GpuSession::new(self, sequence, meshes, truth)?))
     }
 }

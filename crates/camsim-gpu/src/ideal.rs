@@ -13,7 +13,7 @@ use camsim_plan::{
 };
 
 use crate::{
-    context::GpuContext, error::PassError, layout::MeshPlacement, recorder::Recorder, shaders::ComposeError,
+    adapter::GpuError, context::GpuContext, layout::MeshPlacement, recorder::Recorder, shaders::ComposeError,
     upload::SceneBuffers,
 };
 
@@ -233,7 +233,7 @@ impl IdealPass {
         meshes: &[PlacedMesh],
         tolerance: &LodTolerance,
         target: &IdealTarget,
-    ) -> Result<u32, PassError> {
+    ) -> Result<u32, GpuError> {
         let (base_key, supersampled_key) = self.compile(gpu, buffers, plan, target)?;
         let (index_counts, out_of_order) =
             self.upload_keys(gpu, recorder, slots, scene, buffers, plan, meshes, tolerance)?;
@@ -305,7 +305,7 @@ impl IdealPass {
         plan: &FramePlan,
         meshes: &[PlacedMesh],
         tolerance: &LodTolerance,
-    ) -> Result<(Vec<u32>, u32), PassError> {
+    ) -> Result<(Vec<u32>, u32), GpuError> {
         let mut out_of_order = 0;
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {

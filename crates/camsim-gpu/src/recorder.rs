@@ -1,20 +1,15 @@
 //! Commands of a frame while they are recorded, its uploads, and GPU time stamps of its passes.
 
-use crate::{adapter::GpuError, context::GpuContext, staging::Staging};
+use crate::{
+    adapter::{GpuError, PassTime},
+    context::GpuContext,
+    staging::Staging,
+};
 
 /// Maximum number of timed passes of a frame: two of the lens map, ideal frame, its multisampled depth, edge
 /// mask, triangles near edges, supersampled frame, edge mask to alpha, edge lines, reverse, candidates, rays.
 const MAX_PASSES: u32 = 12;
 const STAMPS_BYTES: u64 = 16 * MAX_PASSES as u64;
-
-/// Duration of a pass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PassTime {
-    /// Name of the pass.
-    pub name: &'static str,
-    /// Milliseconds by the GPU's clock.
-    pub ms: f64,
-}
 
 /// Time stamps of the passes of one frame in flight.
 #[derive(Debug)]

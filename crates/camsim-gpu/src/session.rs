@@ -3,20 +3,22 @@
 use std::{collections::HashMap, sync::Arc, time::Instant};
 
 use camsim_core::{
-    camera::ZoomTable,
     scenario::{Face, Primary},
-    scene::{LodTolerance, PlacedMesh, Scene, SceneBatches, TerrainTiles},
+    scene::{SceneBatches, TerrainTiles},
     sequence::Sequence,
+    temporal::IdealGeometry,
 };
 use camsim_plan::{EdgeStage, FramePlan, RayStage};
 
 use crate::{
-    adapter::GpuError,
+    adapter::{
+        AdapterSession, CopiedIdeal, FRAMES_IN_FLIGHT, GpuError, GpuJob, IdealCopy, IdealImages, PassTime,
+        Readback, Submitted,
+    },
     context::GpuContext,
-    error::PassError,
     ideal::{IdealPass, IdealTarget},
-    layout::{FrameUniforms, Truth},
-    recorder::{PassClock, PassTime, Recorder},
+    layout::Truth,
+    recorder::{PassClock, Recorder},
     reverse::{
         EMPTY_LIST, ReverseBindings, ReversePass,
         lens_inverse::{LensInversePass, LensMap, has_shader},
@@ -34,63 +36,11 @@ mod tables;
 
 use frame_slot::{FrameSlot, SessionTarget, group_of, list_buffer, pose_buffer};
 use ideal_copies::IdealCopies;
-pub use ideal_copies::IdealCopy;
-pub use inspect::IdealImages;
 
-/// Frames in flight: one runs on the GPU while the one before is read back.
-pub const FRAMES_IN_FLIGHT: usize = 2;
 /// Maximum number of cached ideal targets.
 const MAX_TARGETS: usize = 4;
 /// Maximum number of cached supersampled or multisampled ideal targets, which take up to 16 times the memory.
 const MAX_FINE_TARGETS: usize = 2;
-
-/// Inputs of a frame.
-#[derive(Clone, Copy, Debug)]
-pub struct GpuJob<'a> {
-    /// The plan.
-    pub plan: &'a FramePlan,
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Terrain triangles of each key frame; empty without a terrain.
-    pub terrain: &'a [PlacedMesh],
-    /// Poses or times of the rows, in the layout of the shaders.
-    pub rows: &'a [u8],
-    /// Uniforms of the frame.
-    pub uniforms: &'a FrameUniforms,
-    /// Level of detail of the models.
-    pub models: &'a LodTolerance,
-    /// Calibrations of a zoom lens.
-    pub zoom: Option<&'a ZoomTable>,
-    /// Whether the ideal frames differ from those of the previous frame.
-    pub redraws: bool,
-    /// What to read back.
-    pub readback: Readback,
-}
-
-/// Result of a frame that is read back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Readback {
-    /// The output frame.
-    Output,
-    /// The ideal frame, for the CPU renderer.
-    Ideal,
-}
-
-/// A submitted frame.
-#[derive(Debug)]
-pub struct Submitted {
-    slot: usize,
-    submission: wgpu::SubmissionIndex,
-    truth: bool,
-    /// The copy of the ideal frame, if it is read back.
-    pub copy: Option<IdealCopy>,
-    /// Blended triangles that are drawn before something behind them, over all ideal frames.
-    pub out_of_order: u32,
-    /// Duration of the recording, ms.
-    pub record_ms: f64,
-    /// Duration of the driver's submit call, ms.
-    pub submit_ms: f64,
-}
 
 /// The ideal frames that were drawn last.
 #[derive(Clone, Copy, Debug)]
@@ -135,7 +85,7 @@ impl<'a> GpuSession<'a> {
         sequence: &Sequence,
         meshes: Arc<SceneBatches>,
         truth: bool,
-    ) -> Result<Self, PassError> {
+    ) -> Result<Self, GpuError> {
         check_output(gpu, sequence, truth)?;
         let scene = &sequence.scene;
         let buffers = SceneBuffers::new(gpu, scene, meshes)?;
@@ -160,18 +110,10 @@ impl<'a> GpuSession<'a> {
         gpu.check()?;
         Ok(session)
     }
+}
 
-    /// Switches to another sequence over the same scene with the same preset: kernels and textures stay on
-    /// the GPU. `before` is the current sequence and whether it has truth.
-    ///
-    /// # Errors
-    /// Output frames that no storage buffer holds; the session then stays as it was.
-    pub fn renew(
-        &mut self,
-        before: (&Sequence, bool),
-        sequence: &Sequence,
-        truth: bool,
-    ) -> Result<(), GpuError> {
+impl AdapterSession for GpuSession<'_> {
+    fn renew(&mut self, before: (&Sequence, bool), sequence: &Sequence, truth: bool) -> Result<(), GpuError> {
         check_output(self.gpu, sequence, truth)?;
         let same_size = before.0.scenario.camera.size_px == sequence.scenario.camera.size_px;
         if !same_size || truth != before.1 {
@@ -189,36 +131,22 @@ impl<'a> GpuSession<'a> {
         self.gpu.check()
     }
 
-    /// Whether the ideal frames that were drawn last are still valid.
-    #[must_use]
-    pub fn has_ideal(&self) -> bool {
-        self.last_ideal.is_some()
-    }
-
-    /// Invalidates the ideal frames that were drawn last.
-    pub fn forget(&mut self) {
+    fn forget(&mut self) {
         self.last_ideal = None;
     }
 
-    /// Tile grid of the terrain's texture, if that is larger than a GPU texture.
-    #[must_use]
-    pub fn tiles(&self) -> Option<Arc<TerrainTiles>> {
+    fn tiles(&self) -> Option<Arc<TerrainTiles>> {
         self.buffers.tiles().map(|tiles| tiles.ground.clone())
     }
 
-    /// Enables time stamps of each pass. `false` if the adapter has none.
-    pub fn time_passes(&mut self) -> bool {
+    fn time_passes(&mut self) -> bool {
         for slot in &mut self.frame_slots {
             slot.clock = PassClock::new(self.gpu);
         }
         self.frame_slots.iter().all(|slot| slot.clock.is_some())
     }
 
-    /// Records and submits a frame in one of [`FRAMES_IN_FLIGHT`] slots.
-    ///
-    /// # Errors
-    /// What the adapter cannot hold, faults of the shader files and of the device.
-    pub fn submit(&mut self, job: &GpuJob<'_>, slot: usize) -> Result<Submitted, PassError> {
+    fn submit(&mut self, job: &GpuJob<'_>, slot: usize) -> Result<Submitted, GpuError> {
         let start = Instant::now();
         let mut clock = self.frame_slots[slot].clock.take();
         let mut staging =
@@ -236,7 +164,7 @@ impl<'a> GpuSession<'a> {
         })?;
         let record_ms = ms_since(start);
         let start = Instant::now();
-        let submission = self.gpu.queue.submit([commands]);
+        self.frame_slots[slot].submission = Some(self.gpu.queue.submit([commands]));
         let submit_ms = ms_since(start);
         self.frame_slots[slot].request_mapping(job.readback == Readback::Output, job.plan.truth);
         self.copies.request_mapping();
@@ -244,61 +172,55 @@ impl<'a> GpuSession<'a> {
         let (out_of_order, copy) =
             self.last_ideal.map(|last_ideal| (last_ideal.out_of_order, last_ideal.copy)).unwrap_or_default();
         let truth = job.plan.truth;
-        Ok(Submitted { slot, submission, truth, copy, out_of_order, record_ms, submit_ms })
+        Ok(Submitted { slot, truth, copy, out_of_order, record_ms, submit_ms })
     }
 
-    /// Waits for a submitted frame.
-    ///
-    /// # Errors
-    /// Faults of the device.
-    pub fn wait(&self, submitted: &Submitted) -> Result<(), GpuError> {
-        let submission_index = Some(submitted.submission.clone());
+    fn wait(&self, submitted: &Submitted) -> Result<(), GpuError> {
+        let submission_index = self.frame_slots[submitted.slot].submission.clone();
         let wait = wgpu::PollType::Wait { submission_index, timeout: None };
         self.gpu.device.poll(wait).map_err(|error| GpuError::Device(error.to_string()))?;
         self.gpu.check()
     }
 
-    /// Output frame of a completed submission: linear R G B A, and the truth if the plan has it.
-    ///
-    /// # Errors
-    /// Faults of the device.
-    pub fn output(&self, submitted: &Submitted) -> Result<(Vec<f32>, Option<Vec<Truth>>), GpuError> {
+    fn output(&self, submitted: &Submitted) -> Result<(Vec<f32>, Option<Vec<Truth>>), GpuError> {
         let slot = &self.frame_slots[submitted.slot];
         let truth = slot.truth.as_ref().filter(|_| submitted.truth);
         let truth = truth.map(|truth| truth.read::<Truth>()).transpose()?;
         Ok((slot.color.read()?, truth))
     }
 
-    /// Calls `read` with the copy of an ideal frame, once its submission is complete.
-    ///
-    /// # Errors
-    /// Faults of the device.
-    pub fn with_copy<R>(
-        &self,
-        copy: IdealCopy,
-        read: impl FnOnce(ideal_copies::CopiedIdeal<'_>) -> R,
-    ) -> Result<R, GpuError> {
+    fn with_copy(&self, copy: IdealCopy, read: &mut dyn FnMut(CopiedIdeal<'_>)) -> Result<(), GpuError> {
         self.copies.read(copy, read)
     }
 
-    /// Duration of each pass of a frame, if time stamps are enabled.
-    ///
-    /// # Errors
-    /// Faults of the device.
-    pub fn pass_times(&self, submitted: &Submitted) -> Result<Vec<PassTime>, GpuError> {
+    fn pass_times(&self, submitted: &Submitted) -> Result<Vec<PassTime>, GpuError> {
         match &self.frame_slots[submitted.slot].clock {
             Some(clock) => Ok(clock.passes(self.gpu, &readback::read_mapped(clock.cpu_buffer())?)),
             None => Ok(Vec::new()),
         }
     }
 
+    fn read_ideal(&self, ideal: &IdealGeometry) -> Result<Option<IdealImages>, GpuError> {
+        self.ideal_images(ideal)
+    }
+
+    fn triangles_near_edges(&self) -> Result<Option<u64>, GpuError> {
+        self.edge_triangles()
+    }
+
+    fn resident_tiles(&self) -> Option<[usize; 2]> {
+        self.buffers.tiles().map(|tiles| [tiles.resident().0, tiles.ground.grid.count as usize])
+    }
+}
+
+impl GpuSession<'_> {
     /// Records all passes of a frame in order.
     fn record(
         &mut self,
         job: &GpuJob<'_>,
         slot: usize,
         mut recorder: Recorder<'_>,
-    ) -> Result<wgpu::CommandBuffer, PassError> {
+    ) -> Result<wgpu::CommandBuffer, GpuError> {
         let has_output = job.readback == Readback::Output;
         if has_output && job.plan.ray == RayStage::LensMap {
             self.lens_inverse(&mut recorder, job);
@@ -361,7 +283,7 @@ impl<'a> GpuSession<'a> {
         recorder: &mut Recorder<'_>,
         job: &GpuJob<'_>,
         slot: usize,
-    ) -> Result<LastIdeal, PassError> {
+    ) -> Result<LastIdeal, GpuError> {
         let (gpu, plan) = (self.gpu, job.plan);
         let target = self.target(plan);
         self.buffers.upload_textures(gpu, job.scene);

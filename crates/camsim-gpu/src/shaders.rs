@@ -8,6 +8,8 @@
 
 use std::borrow::Cow;
 
+use crate::adapter::GpuError;
+
 macro_rules! embedded {
     ($($path:literal),* $(,)?) => {
         /// All shader files: path below `shaders/`, text.
@@ -147,6 +149,12 @@ pub enum ComposeError {
         /// File that imports the slot.
         file: String,
     },
+}
+
+impl From<ComposeError> for GpuError {
+    fn from(error: ComposeError) -> Self {
+        Self::Shader(Box::new(error))
+    }
 }
 
 /// WGSL text of `file` with its imports, each once, in order of first use.

@@ -30,11 +30,13 @@
 //! | `planner` | the [`Planner`], which puts a plan together from the choices |
 //! | `tracks` | where frames show given points of the scene |
 //! | [`uniforms`] | the numbers of a frame as the renderers read them |
+//! | [`adapter`] | what executes plans on a graphics adapter |
 //! | `describe` | the plan as text and as JSON |
 //!
 //! The temporal inverse and the terrain's level of detail are chosen in `choose`, not in `source_error`: the
 //! choice depends on what source errors cost in the picture too.
 
+pub mod adapter;
 mod choose;
 mod describe;
 mod ir;

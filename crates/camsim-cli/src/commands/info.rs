@@ -1,7 +1,6 @@
 //! `camsim info`.
 
-use camsim_engine::{AdapterChoice, Engine};
-use camsim_gpu::{AdapterSummary, context::adapters};
+use camsim_engine::{AdapterChoice, AdapterSummary, Engine, adapters};
 use serde::Serialize;
 
 use crate::{backend::BackendArgs, console::Console, failure::Failure};
@@ -78,13 +77,14 @@ pub fn run(args: &InfoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
 }
 
 fn info(engine: &Engine) -> Info {
-    let listed = engine.gpu().map_or_else(Vec::new, |_| adapters(AdapterChoice::Best));
+    let listed = engine.adapter().map_or_else(Vec::new, |_| adapters(AdapterChoice::Best));
+    let limits = engine.adapter().map(|adapter| adapter.limits());
     Info {
         version: env!("CARGO_PKG_VERSION"),
         renders: engine.to_string(),
         adapters: listed.into_iter().enumerate().map(|(i, adapter)| Adapter::of(adapter, i == 0)).collect(),
-        max_side_px: engine.gpu().map(|gpu| gpu.max_side_px()),
-        max_storage_buffer_bytes: engine.gpu().map(|gpu| gpu.max_storage_bytes()),
+        max_side_px: limits.map(|limits| limits.max_side_px),
+        max_storage_buffer_bytes: limits.map(|limits| limits.max_storage_bytes),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
         cpu_vectors: engine.capabilities().has_vectors,
     }

@@ -5,8 +5,9 @@ use camsim_core::{
     sequence::Sequence,
 };
 
-use super::{FRAMES_IN_FLIGHT, readback::ReadbackBuffer};
+use super::readback::ReadbackBuffer;
 use crate::{
+    adapter::FRAMES_IN_FLIGHT,
     context::GpuContext,
     ideal::{IdealSlot, IdealTarget},
     layout::{FrameUniforms, Truth},
@@ -52,6 +53,8 @@ pub(super) struct FrameSlot {
     pub color: ReadbackBuffer,
     pub truth: Option<ReadbackBuffer>,
     pub clock: Option<PassClock>,
+    /// The last frame's submission.
+    pub submission: Option<wgpu::SubmissionIndex>,
 }
 
 impl FrameSlot {
@@ -73,6 +76,7 @@ impl FrameSlot {
                 ReadbackBuffer::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)
             }),
             clock: None,
+            submission: None,
         }
     }
 

@@ -3,30 +3,18 @@
 use camsim_core::temporal::IdealGeometry;
 
 use super::readback::TextureReadback;
-use crate::{adapter::GpuError, context::GpuContext, ideal::IdealTarget, recorder::Recorder};
+use crate::{
+    adapter::{CopiedIdeal, GpuError, IdealCopy},
+    context::GpuContext,
+    ideal::IdealTarget,
+    recorder::Recorder,
+};
 
 /// Number of copies: one for the frame at work, one for the frame in flight after it.
 const COPY_COUNT: usize = 2;
 /// Size of a colour texel, four half floats, and of a depth texel, a float, bytes.
 const COLOR_BYTES: usize = 8;
 const DEPTH_BYTES: usize = 4;
-
-/// Handle of a copy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct IdealCopy(usize);
-
-/// An ideal frame in memory.
-#[derive(Clone, Copy, Debug)]
-pub struct CopiedIdeal<'a> {
-    /// Linear R G B A, half floats.
-    pub color: &'a [u16],
-    /// Texels from one row of `color` to the next.
-    pub color_stride: u32,
-    /// `near / z`, 0 = sky.
-    pub depth: &'a [f32],
-    /// Texels from one row of `depth` to the next.
-    pub depth_stride: u32,
-}
 
 #[derive(Debug)]
 struct CopyBuffers {
@@ -89,19 +77,20 @@ impl IdealCopies {
         }
     }
 
-    pub fn read<R>(
+    pub fn read(
         &self,
         IdealCopy(copy): IdealCopy,
-        read: impl FnOnce(CopiedIdeal<'_>) -> R,
-    ) -> Result<R, GpuError> {
+        read: &mut dyn FnMut(CopiedIdeal<'_>),
+    ) -> Result<(), GpuError> {
         let copy = &self.copies[copy];
         let (color, depth) = (copy.color.view()?, copy.depth.view()?);
         let to_error = |error: bytemuck::PodCastError| GpuError::Device(error.to_string());
-        Ok(read(CopiedIdeal {
+        read(CopiedIdeal {
             color: bytemuck::try_cast_slice(&color).map_err(to_error)?,
             color_stride: copy.color.stride_bytes / COLOR_BYTES as u32,
             depth: bytemuck::try_cast_slice(&depth).map_err(to_error)?,
             depth_stride: copy.depth.stride_bytes / DEPTH_BYTES as u32,
-        }))
+        });
+        Ok(())
     }
 }
