@@ -7,6 +7,8 @@
 
 use thiserror::Error;
 
+use crate::scene::LUMINANCE_F64;
+
 /// Interleaved samples, row-major from the top-left pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageView<'a> {
@@ -176,7 +178,10 @@ fn are_comparable(x: f32, y: f32) -> bool {
 /// images.
 fn luminance(view: ImageView<'_>, usable: &[bool]) -> Vec<f64> {
     let value = |pixel: &[f32]| match pixel {
-        [r, g, b, ..] => 0.2126 * f64::from(*r) + 0.7152 * f64::from(*g) + 0.0722 * f64::from(*b),
+        [r, g, b, ..] => {
+            let [of_r, of_g, of_b] = LUMINANCE_F64;
+            of_r * f64::from(*r) + of_g * f64::from(*g) + of_b * f64::from(*b)
+        }
         [first, ..] => f64::from(*first),
         [] => 0.0,
     };

@@ -36,8 +36,8 @@ pub use terrain::{
     TerrainVertex, TerrainWalk, WalkHit,
 };
 pub use texture::{
-    Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, linear_from_srgb_f64, srgb_from_linear,
-    srgb_from_linear_f64,
+    Encoding, LUMINANCE, LUMINANCE_F64, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb,
+    linear_from_srgb_f64, srgb_from_linear, srgb_from_linear_f64,
 };
 pub use texture_tiles::{TILE_SIDE, TileGrid, TileSource, is_whole, tile_bytes};
 

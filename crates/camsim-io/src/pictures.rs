@@ -13,6 +13,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, metadata::Orie
 use crate::{
     similar_file::suggestion,
     terrain::raster::{Raster, is_tiff, max_decoded_bytes},
+    write::luminance,
 };
 
 /// Why a picture cannot be read.
@@ -200,7 +201,7 @@ pub(crate) fn gray_from_texture(texture: &Texture) -> GrayImage {
 
 /// Rec. 709 luma; exact for equal channels.
 fn luma([r, g, b]: [f32; 3]) -> f32 {
-    if r == g && g == b { r } else { 0.2126 * r + 0.7152 * g + 0.0722 * b }
+    if r == g && g == b { r } else { luminance([r, g, b]) }
 }
 
 /// Size of an encoded picture in memory, pixels.

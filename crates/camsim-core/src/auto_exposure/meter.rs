@@ -15,6 +15,7 @@ use crate::{
     pose::CameraPose,
     reference::{Hit, Oracle, zoom_at},
     scenario::{AutoExposureSpec, MeterWeights},
+    scene::LUMINANCE_F64,
     sequence::Sequence,
     shutter::Shutter,
 };
@@ -26,8 +27,6 @@ const ROWS: usize = 18;
 const READS: u32 = 4;
 /// Least cosine between the normals of neighbouring points on one face of a mesh.
 const SAME_FACE: f64 = 0.99;
-/// Rec. 709.
-const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
 /// The meter of a camera.
 #[derive(Debug)]
@@ -87,7 +86,7 @@ impl MeteredLight {
     }
 
     fn add(&mut self, color: DVec3, point: &MeterPoint, share: f64) {
-        let light = point.vignette * LUMINANCE.dot(color);
+        let light = point.vignette * DVec3::from_array(LUMINANCE_F64).dot(color);
         // What is no number is dark.
         let light = if light.is_finite() { light.max(0.0) } else { 0.0 };
         self.places.push([light, point.weight * share].map(|value| value as f32));

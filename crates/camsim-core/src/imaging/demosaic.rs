@@ -2,7 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::scenario::{Demosaic, Mosaic};
+use crate::{
+    scenario::{Demosaic, Mosaic},
+    scene::LUMINANCE,
+};
 
 /// Numbers of colours.
 pub const RED: u8 = 0;
@@ -20,8 +23,6 @@ const RGBW: [[u8; RGBW_SIDE]; RGBW_SIDE] = [
     [WHITE, GREEN, WHITE, RED],
     [GREEN, WHITE, RED, WHITE],
 ];
-/// Rec. 709 luminance.
-const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Colour that a pixel measures.
 #[must_use]

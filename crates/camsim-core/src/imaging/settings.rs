@@ -1,6 +1,9 @@
 //! Numbers of a sensor, from its keys.
 
-use crate::scenario::{Companding, ImageSensorSpec, Mosaic};
+use crate::{
+    scenario::{Companding, ImageSensorSpec, Mosaic},
+    scene::LUMINANCE_F64,
+};
 
 /// Planck's constant times the speed of light, J m (both exact in the SI).
 const PLANCK_TIMES_LIGHT: f64 = 6.626_070_15e-34 * 299_792_458.0;
@@ -10,8 +13,6 @@ const LUMENS_A_WATT: f64 = 683.0;
 const LUX_WAVELENGTH_M: f64 = 555e-9;
 /// Bits of a sensor that says nothing of them.
 pub(crate) const BITS: u32 = 12;
-/// Rec. 709 luminance.
-const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Numbers of a sensor.
 #[derive(Clone, Debug)]
@@ -194,7 +195,7 @@ pub(super) fn between(points: &[[f64; 2]], from: usize, value: f64) -> f64 {
 fn efficiencies(spec: &ImageSensorSpec) -> [f64; 4] {
     let Some(stated) = &spec.quantum_efficiency else { return [1.0; 4] };
     let rgb = stated.rgb();
-    let luminance = (0..3).map(|channel| LUMINANCE[channel] * rgb[channel]).sum();
+    let luminance = (0..3).map(|channel| LUMINANCE_F64[channel] * rgb[channel]).sum();
     [rgb[0], rgb[1], rgb[2], stated.white().unwrap_or(luminance)]
 }
 
@@ -222,7 +223,7 @@ fn white_electrons(spec: &ImageSensorSpec, exposure_s: f64) -> [f64; 4] {
 /// Electrons of each channel per linear R, G, B.
 fn weights(spec: &ImageSensorSpec, white_e: [f64; 4]) -> [[f32; 3]; 4] {
     let m = &spec.spectral_matrix;
-    let rows = [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]], LUMINANCE];
+    let rows = [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]], LUMINANCE_F64];
     let mut scaled = [[0.0; 3]; 4];
     for (scaled, (row, electrons)) in scaled.iter_mut().zip(rows.iter().zip(white_e)) {
         *scaled = row.map(|share| (share * electrons) as f32);

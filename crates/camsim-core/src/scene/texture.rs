@@ -69,9 +69,12 @@ impl Wrap {
     }
 }
 
-/// The curve of sRGB (IEC 61966-2-1) in one precision.
+/// The curve of sRGB (IEC 61966-2-1), and luminance, in one precision.
 macro_rules! srgb_curve {
-    ($real:ty, $linear_from_srgb:ident, $srgb_from_linear:ident) => {
+    ($real:ty, $linear_from_srgb:ident, $srgb_from_linear:ident, $luminance:ident) => {
+        /// Luminance of linear red, green and blue with the primaries of sRGB (Rec. 709).
+        pub const $luminance: [$real; 3] = [0.2126, 0.7152, 0.0722];
+
         /// Linear light of an sRGB value in 0..=1 (IEC 61966-2-1).
         pub fn $linear_from_srgb(stored: $real) -> $real {
             if stored <= 0.04045 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
@@ -84,8 +87,8 @@ macro_rules! srgb_curve {
     };
 }
 
-srgb_curve!(f32, linear_from_srgb, srgb_from_linear);
-srgb_curve!(f64, linear_from_srgb_f64, srgb_from_linear_f64);
+srgb_curve!(f32, linear_from_srgb, srgb_from_linear, LUMINANCE);
+srgb_curve!(f64, linear_from_srgb_f64, srgb_from_linear_f64, LUMINANCE_F64);
 
 /// A texture, row-major from its top-left pixel, four bytes per pixel. Alpha 0 marks pixels without content.
 #[derive(Clone, PartialEq)]

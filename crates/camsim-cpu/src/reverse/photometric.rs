@@ -1,13 +1,13 @@
 //! Vignette, brightness, noise and saturation: twin of shaders/reverse/photometric.wgsl and
 //! shaders/common/noise.wgsl.
 
-use camsim_core::noise::{NOISE_STREAM, SEGMENTS, pcg4d};
+use camsim_core::{
+    noise::{NOISE_STREAM, SEGMENTS, pcg4d},
+    scene::LUMINANCE,
+};
 
 use crate::simd::lanes::{LANES, Lanes, ZERO, clamp_to, per_lane};
 use camsim_plan::uniforms::FrameUniforms;
-
-/// Luminance weights (Rec. 709).
-const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Photometric stage of pixels of a row, from `x` on.
 #[inline(always)]

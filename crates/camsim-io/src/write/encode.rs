@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
-use camsim_core::scene::{linear_from_srgb_f64, srgb_from_linear_f64};
+use camsim_core::scene::{LUMINANCE, linear_from_srgb_f64, srgb_from_linear_f64};
 
 /// Rec. 709 luminance of linear RGB.
 pub fn luminance(rgb: [f32; 3]) -> f32 {
-    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+    LUMINANCE[0] * rgb[0] + LUMINANCE[1] * rgb[1] + LUMINANCE[2] * rgb[2]
 }
 
 /// Nearest 8-bit code; NaN gives 0.
