@@ -79,7 +79,7 @@ pub use picture::write_picture;
 pub(crate) use png_file::encode as encode_png;
 pub use png_file::{contact_sheet, palette_rgb8};
 pub use rig::{RIG_TOML, rig_names, rig_toml, write_rig};
-pub(crate) use sensors::{KalibrFigures, imu_yaml};
+pub(crate) use sensors::{KalibrFigures, SensorFile, imu_yaml};
 pub use sensors::{SENSORS_FOLDER, SensorSummary, kalibr_yaml, write_sensors};
 pub use tables::{OBJECTS_COLUMNS, Stamped, objects_csv, rows_csv, trajectory_csv};
 pub use timing::{TIMING_CSV, timing_csv};

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::{DatasetError, RunCamera, RunFolder, axes::Rigid, csv_rows::CsvRows, run_folder::PlatformRows};
 use crate::{
     calibration::ImuReference,
-    write::{KalibrFigures, SENSORS_FOLDER},
+    write::{KalibrFigures, SENSORS_FOLDER, SensorFile},
 };
 
 /// An inertial sensor, with a table of its measurements.
@@ -57,28 +57,14 @@ pub(super) struct ImuRow {
     pub(super) acc_bias_m_s2: DVec3,
 }
 
-/// A sensor's description, `sensors/NAME.toml`.
-#[derive(Clone, Debug, Deserialize)]
-pub(super) struct SensorDescription {
-    pub(super) kind: String,
-    /// Its table; as read, relative to the folder.
-    pub(super) table: PathBuf,
-    pub(super) rate_hz: f64,
-    #[serde(rename = "T_body_sensor")]
-    body_from_sensor: [[f64; 4]; 4],
-    #[serde(default)]
-    noise: KalibrFigures,
-    gravity_at_origin_m_s2: Option<f64>,
-    #[serde(default)]
-    scenario: SensorKeys,
-}
+/// A sensor's description, with the path of its table.
+pub(super) type SensorDescription = SensorFile<SensorKeys>;
 
 /// Keys of the scenario.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
-struct SensorKeys {
-    #[serde(default)]
+#[serde(default)]
+pub(super) struct SensorKeys {
     clock_offset_ms: f64,
-    #[serde(default)]
     attached_to: SensorCarrier,
 }
 
@@ -126,7 +112,7 @@ pub(super) fn imus(run: &RunFolder) -> Result<Vec<ImuSensor>, DatasetError> {
             rate_hz: sensor.rate_hz,
             shakes: sensor.scenario.attached_to == SensorCarrier::Camera && run.cameras[0].vibrates(),
             clock_offset_s: 1e-3 * sensor.scenario.clock_offset_ms,
-            noise: sensor.noise,
+            noise: sensor.noise.unwrap_or_default(),
             gravity_m_s2: sensor.gravity_at_origin_m_s2.unwrap_or(STANDARD_GRAVITY),
             shift_ns: run.shift_ns(),
             path: sensor.table,

@@ -21,6 +21,7 @@ mod description;
 mod kalibr;
 
 use description::Description;
+pub(crate) use description::SensorFile;
 pub use kalibr::kalibr_yaml;
 pub(crate) use kalibr::{KalibrFigures, imu_yaml};
 
@@ -69,54 +70,31 @@ impl Counts {
 /// A file cannot be written, or would replace one that camsim has not made.
 pub fn write_sensors(folder: &Path, sensors: &Sensors) -> Result<SensorSummary, WriteError> {
     let folder = folder.join(SENSORS_FOLDER);
-    let mut descriptions: Vec<Description<'_>> = Vec::new();
-    descriptions.extend(sensors.imus.iter().map(Description::of_imu));
-    descriptions.extend(sensors.gnss.iter().map(Description::of_gnss));
-    descriptions.extend(sensors.barometers.iter().map(Description::of_barometer));
-    descriptions.extend(sensors.magnetometers.iter().map(Description::of_magnetometer));
+    let descriptions = Description::of_all(sensors);
     remove_others(&folder, &descriptions)?;
     for description in &descriptions {
         refuse_foreign(&folder, description.name)?;
     }
     let mut summary = SensorSummary { sensors: descriptions.len(), rows: 0 };
-    let mut tables: Vec<Counts> = Vec::new();
-    for imu in &sensors.imus {
-        let mark = |sample: &ImuSample| (sample.time, sample.is_saturated);
-        tables.push(write_table(&folder, &imu.spec.name, imu.input(), imu.samples(), mark)?);
-        let path = folder.join(format!("{}_kalibr.yaml", imu.spec.name));
-        write_atomic(&path, kalibr_yaml(&imu.spec).as_bytes())?;
-    }
-    for gnss in &sensors.gnss {
-        let mark = |sample: &GnssSample| (sample.time, sample.fix.is_none());
-        tables.push(write_table(&folder, &gnss.spec.name, gnss.input(), gnss.samples(), mark)?);
-    }
-    for barometer in &sensors.barometers {
-        let (name, input) = (&barometer.spec.name, barometer.input());
-        tables.push(write_table(&folder, name, input, barometer.samples(), |air| (air.time, false))?);
-    }
-    for magnetometer in &sensors.magnetometers {
-        let (name, input) = (&magnetometer.spec.name, magnetometer.input());
-        tables.push(write_table(&folder, name, input, magnetometer.samples(), |field| (field.time, false))?);
-    }
-    for (description, counts) in descriptions.iter().zip(&tables) {
+    for description in &descriptions {
+        let counts = (description.write_table)(&folder.join(format!("{}.csv", description.name)))?;
         summary.rows += counts.rows;
-        description.write(&folder, counts)?;
+        description.write(&folder, &counts)?;
     }
     Ok(summary)
 }
 
-/// Writes one table, row by row. `mark` gives a sample's time, and whether an axis is at the end of its range or
+/// Writes a table, row by row. `mark` gives a sample's time, and whether an axis is at the end of its range or
 /// there is no fix.
 fn write_table<R: TableRow>(
-    folder: &Path,
-    name: &str,
+    path: &Path,
     input: &SensorInput,
     samples: impl Iterator<Item = R>,
     mark: impl Fn(&R) -> (SampleTime, bool),
 ) -> Result<Counts, WriteError> {
     let mut counts = Counts::default();
     let mut samples = Some(samples);
-    write_atomic_with(&folder.join(format!("{name}.csv")), &mut |out| {
+    write_atomic_with(path, &mut |out| {
         writeln!(out, "{}", header(R::COLUMNS))?;
         let mut line = String::new();
         for sample in samples.take().into_iter().flatten() {

@@ -36,7 +36,7 @@ pub(super) struct Sample {
 
 /// The IMU of a sample.
 pub(super) const IMU_TOML: &str = "kind = \"imu\"\nname = \"imu0\"\ntable = \"imu0.csv\"\nrate_hz = 200.0\nrows = 2\n\
-    gravity_at_origin_m_s2 = 9.80737\n\
+    rows_outside_log = 0\ngravity_at_origin_m_s2 = 9.80737\n\
     T_body_sensor = [[1.0, 0.0, 0.0, 0.5], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.25], [0.0, 0.0, 0.0, 1.0]]\n\
     [noise]\ngyroscope_noise_density = 0.01\ngyroscope_random_walk = 0.001\naccelerometer_noise_density = 0.02\n\
     accelerometer_random_walk = 0.002\n[scenario]\nclock_offset_ms = 2.0\n";
@@ -141,8 +141,9 @@ impl Sample {
         let rows = "990000000,1,2,3,4,5,6,988000000,0.1,0.2,0.3,0.4,0.5,0.6\n\
                     1500000000,7,8,9,10,11,12,1498000000,0.2,0.3,0.4,0.5,0.6,0.7\n";
         write("imu0.csv", format!("{IMU_COLUMNS}\n{rows}"));
-        let gnss = "kind = \"gnss\"\nname = \"gnss0\"\ntable = \"gnss0.csv\"\nrate_hz = 1.0\nT_body_sensor = [[1.0, \
-                    0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]\n";
+        let gnss = "kind = \"gnss\"\nname = \"gnss0\"\ntable = \"gnss0.csv\"\nrate_hz = 1.0\nrows = 2\n\
+                    rows_outside_log = 0\nT_body_sensor = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, \
+                    0.0], [0.0, 0.0, 0.0, 1.0]]\n[scenario]\n";
         write("gnss0.toml", gnss.to_owned());
         let fixes = "t_ns,fix,lat_deg,lon_deg,height_m,t_available_ns,t_true_ns,true_lat_deg\n\
                      1000000001,1,46.5,7.25,900.5,1000000005,1000000001,46.5\n\

@@ -1,18 +1,22 @@
 //! `NAME.toml`: what the sensor of a table is.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use camsim_core::{
     scenario::{BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec},
-    sensors::{Barometer, Gnss, Imu, Magnetometer, SensorInput, SensorMount},
+    sensors::{SensorInput, SensorMount, Sensors},
 };
 use glam::{DMat3, DVec3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{Counts, MARK, WriteError, description_path, kalibr::KalibrFigures, write_atomic};
+use super::{
+    Counts, MARK, WriteError, description_path,
+    kalibr::{KalibrFigures, kalibr_yaml},
+    write_atomic, write_table,
+};
 
 /// The keys of a sensor in the scenario.
-#[derive(Serialize)]
+#[derive(Clone, Copy, Serialize)]
 #[serde(untagged)]
 enum Spec<'a> {
     Imu(&'a ImuSpec),
@@ -21,7 +25,10 @@ enum Spec<'a> {
     Magnetometer(&'a MagnetometerSpec),
 }
 
-/// What is known of a sensor before its rows.
+/// Writes the table of a sensor to a path.
+type WriteTable<'a> = Box<dyn Fn(&Path) -> Result<Counts, WriteError> + 'a>;
+
+/// What is known of a sensor before its rows, and its rows.
 pub(super) struct Description<'a> {
     pub(super) name: &'a str,
     kind: &'static str,
@@ -31,15 +38,17 @@ pub(super) struct Description<'a> {
     matrices: Option<[DMat3; 2]>,
     noise: Option<KalibrFigures>,
     spec: Spec<'a>,
+    pub(super) write_table: WriteTable<'a>,
 }
 
-/// The file, in its order.
-#[derive(Serialize)]
-struct File<'a> {
-    kind: &'static str,
-    name: &'a str,
-    table: String,
-    rate_hz: f64,
+/// The file, in its order; exports read it, with those of its keys in the scenario that they need.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct SensorFile<S> {
+    pub(crate) kind: String,
+    name: String,
+    /// Its table, relative to the folder.
+    pub(crate) table: PathBuf,
+    pub(crate) rate_hz: f64,
     rows: u64,
     /// Rows before the first row of the log or after its last one, where the platform coasts.
     rows_outside_log: u64,
@@ -55,22 +64,23 @@ struct File<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     local_origin: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    gravity_at_origin_m_s2: Option<f64>,
+    pub(crate) gravity_at_origin_m_s2: Option<f64>,
     #[serde(rename = "T_body_sensor")]
-    body_from_sensor: [[f64; 4]; 4],
+    pub(crate) body_from_sensor: [[f64; 4]; 4],
     /// reading = matrix x truth + ...
     #[serde(skip_serializing_if = "Option::is_none")]
     gyro_matrix: Option<[[f64; 3]; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     accel_matrix: Option<[[f64; 3]; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    noise: Option<KalibrFigures>,
-    scenario: &'a Spec<'a>,
+    pub(crate) noise: Option<KalibrFigures>,
+    pub(crate) scenario: S,
 }
 
 impl<'a> Description<'a> {
-    pub(super) fn of_imu(imu: &'a Imu) -> Self {
-        Self {
+    /// The descriptions of all sensors.
+    pub(super) fn of_all(sensors: &'a Sensors) -> Vec<Self> {
+        let imus = sensors.imus.iter().map(|imu| Self {
             name: &imu.spec.name,
             kind: "imu",
             rate_hz: imu.clock.rate_hz(),
@@ -79,11 +89,11 @@ impl<'a> Description<'a> {
             matrices: Some(imu.matrices()),
             noise: Some(KalibrFigures::new(&imu.spec)),
             spec: Spec::Imu(&imu.spec),
-        }
-    }
-
-    pub(super) fn of_gnss(gnss: &'a Gnss) -> Self {
-        Self {
+            write_table: Box::new(move |path| {
+                write_table(path, imu.input(), imu.samples(), |row| (row.time, row.is_saturated))
+            }),
+        });
+        let gnss = sensors.gnss.iter().map(|gnss| Self {
             name: &gnss.spec.name,
             kind: "gnss",
             rate_hz: gnss.clock.rate_hz(),
@@ -92,35 +102,40 @@ impl<'a> Description<'a> {
             matrices: None,
             noise: None,
             spec: Spec::Gnss(&gnss.spec),
-        }
-    }
-
-    pub(super) fn of_barometer(barometer: &'a Barometer) -> Self {
-        Self {
-            name: &barometer.spec.name,
+            write_table: Box::new(move |path| {
+                write_table(path, gnss.input(), gnss.samples(), |row| (row.time, row.fix.is_none()))
+            }),
+        });
+        let barometers = sensors.barometers.iter().map(|air| Self {
+            name: &air.spec.name,
             kind: "barometer",
-            rate_hz: barometer.clock.rate_hz(),
-            mount: barometer.mount,
-            input: barometer.input(),
+            rate_hz: air.clock.rate_hz(),
+            mount: air.mount,
+            input: air.input(),
             matrices: None,
             noise: None,
-            spec: Spec::Barometer(&barometer.spec),
-        }
-    }
-
-    pub(super) fn of_magnetometer(magnetometer: &'a Magnetometer) -> Self {
-        Self {
-            name: &magnetometer.spec.name,
+            spec: Spec::Barometer(&air.spec),
+            write_table: Box::new(move |path| {
+                write_table(path, air.input(), air.samples(), |row| (row.time, false))
+            }),
+        });
+        let magnetometers = sensors.magnetometers.iter().map(|field| Self {
+            name: &field.spec.name,
             kind: "magnetometer",
-            rate_hz: magnetometer.clock.rate_hz(),
-            mount: magnetometer.mount,
-            input: magnetometer.input(),
+            rate_hz: field.clock.rate_hz(),
+            mount: field.mount,
+            input: field.input(),
             matrices: None,
             noise: None,
-            spec: Spec::Magnetometer(&magnetometer.spec),
-        }
+            spec: Spec::Magnetometer(&field.spec),
+            write_table: Box::new(move |path| {
+                write_table(path, field.input(), field.samples(), |row| (row.time, false))
+            }),
+        });
+        imus.chain(gnss).chain(barometers).chain(magnetometers).collect()
     }
 
+    /// Writes the description, and of an inertial unit Kalibr's.
     pub(super) fn write(&self, folder: &Path, counts: &Counts) -> Result<(), WriteError> {
         let path = description_path(folder, self.name);
         let encode =
@@ -132,10 +147,14 @@ impl<'a> Description<'a> {
              keys of the scenario.\n",
             self.name
         );
+        if let Spec::Imu(spec) = self.spec {
+            let path = folder.join(format!("{}_kalibr.yaml", self.name));
+            write_atomic(&path, kalibr_yaml(spec).as_bytes())?;
+        }
         write_atomic(&path, (head + &text).as_bytes())
     }
 
-    fn file(&self, counts: &Counts) -> File<'_> {
+    fn file(&self, counts: &Counts) -> SensorFile<Spec<'_>> {
         let [first_t_ns, last_t_ns] = [0, 1].map(|i| counts.stamps_ns.map(|stamps| stamps[i]));
         let mut earth = self.input.earth.clone();
         let origin = earth.origin().map(|at| [at.lat_deg(), at.lon_deg(), at.height_m]);
@@ -143,10 +162,10 @@ impl<'a> Description<'a> {
         let gravity = earth.gravity_ned_m_s2(DVec3::ZERO).length();
         let rows_of = |matrix: DMat3| [0, 1, 2].map(|row| matrix.row(row).to_array());
         let matrix = self.mount.body_from_sensor_matrix();
-        File {
-            kind: self.kind,
-            name: self.name,
-            table: format!("{}.csv", self.name),
+        SensorFile {
+            kind: self.kind.to_owned(),
+            name: self.name.to_owned(),
+            table: format!("{}.csv", self.name).into(),
             rate_hz: self.rate_hz,
             rows: counts.rows,
             rows_outside_log: counts.outside_log,
@@ -160,7 +179,7 @@ impl<'a> Description<'a> {
             gyro_matrix: self.matrices.map(|[gyro, _]| rows_of(gyro)),
             accel_matrix: self.matrices.map(|[_, accel]| rows_of(accel)),
             noise: self.noise,
-            scenario: &self.spec,
+            scenario: self.spec,
         }
     }
 }
