@@ -35,7 +35,6 @@ use camsim_core::{
         FlightLog, HeightConversion, LogError, LogOptions, LogRow, Note, RawAttitude, RawPosition, RawRow,
     },
     geodesy::Geodetic,
-    pose::{ENU_FROM_NED, FLU_FROM_FRD},
     scenario::{AttitudeSource, FlightSpec, LogFormat},
 };
 use glam::{DQuat, DVec3};
@@ -94,6 +93,7 @@ mod xml_prose;
 use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;
 
+use crate::calibration::axes::{enu, enu_from_flu};
 pub use error::FlightLogError;
 pub use reference::reference;
 
@@ -288,7 +288,7 @@ fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
         Frame::Geodetic => RawPosition::Geodetic(Geodetic::from_deg(a, b, c)),
         Frame::NorthEastUp => RawPosition::Ned(DVec3::new(a, b, -c)),
         Frame::NorthEastDown => RawPosition::Ned(DVec3::new(a, b, c)),
-        Frame::EastNorthUp => RawPosition::Ned(DVec3::new(b, a, -c)),
+        Frame::EastNorthUp => RawPosition::Ned(enu(DVec3::new(a, b, c))),
     };
     let attitude = match kind {
         // A partial attitude is kept, with NaN: the cleaning treats it as faulty.
@@ -298,7 +298,7 @@ fn raw_row(row: &rows::ParsedRow, frame: Frame, kind: AttitudeKind) -> RawRow {
         AttitudeKind::Quaternion => {
             let world_from_body = DQuat::from_array(row.attitude);
             RawAttitude::Quaternion(match frame {
-                Frame::EastNorthUp => ENU_FROM_NED * world_from_body * FLU_FROM_FRD,
+                Frame::EastNorthUp => enu_from_flu(world_from_body),
                 _ => world_from_body,
             })
         }

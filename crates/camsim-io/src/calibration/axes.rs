@@ -2,7 +2,7 @@
 
 use camsim_core::{
     mount::body_from_camera,
-    pose::{CameraPose, ENU_FROM_NED},
+    pose::{CameraPose, ENU_FROM_NED, FLU_FROM_FRD},
     scenario::MountSpec,
 };
 use glam::{DQuat, DVec3};
@@ -61,10 +61,16 @@ impl Rigid {
     }
 }
 
-/// A point or vector in NED, in ENU; exact.
+/// A point or vector in NED, in ENU, or the other way round; exact.
 #[must_use]
 pub fn enu(ned: DVec3) -> DVec3 {
     DVec3::new(ned.y, ned.x, -ned.z)
+}
+
+/// Attitude in ENU of a body with x forward, y left, z up, by that in NED of forward, right, down, or the other way
+/// round.
+pub(crate) fn enu_from_flu(ned_from_frd: DQuat) -> DQuat {
+    ENU_FROM_NED * ned_from_frd * FLU_FROM_FRD
 }
 
 /// Pose of optical camera axes in ENU.
@@ -78,7 +84,7 @@ pub fn enu_from_camera(pose: &CameraPose) -> Rigid {
 
 #[cfg(test)]
 mod tests {
-    use camsim_core::pose::{FLU_FROM_FRD, FRD_FROM_RDF};
+    use camsim_core::pose::FRD_FROM_RDF;
 
     use super::*;
 

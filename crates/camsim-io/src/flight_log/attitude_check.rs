@@ -1,12 +1,10 @@
 //! Attitudes that contradict the flight: the body not upright, or one attitude while the path turns.
 
-use camsim_core::{
-    flight_log::{FlightLog, LogRow, Note, RawAttitude, RawRow},
-    pose::{ENU_FROM_NED, FLU_FROM_FRD},
-};
+use camsim_core::flight_log::{FlightLog, LogRow, Note, RawAttitude, RawRow};
 use glam::{DQuat, DVec3, EulerRot};
 
 use super::RawLog;
+use crate::calibration::axes::enu_from_flu;
 
 /// Rows that are looked at.
 const MAX_ROWS: usize = 2000;
@@ -112,8 +110,7 @@ fn in_the_other_order(attitudes: &[DQuat], reading: QuaternionReading) -> Vec<DQ
         true => DQuat::from_xyzw(q.w, q.x, q.y, q.z),
         false => DQuat::from_xyzw(q.y, q.z, q.w, q.x),
     };
-    let in_enu =
-        |q: DQuat| ENU_FROM_NED * reorder(ENU_FROM_NED.inverse() * q * FLU_FROM_FRD.inverse()) * FLU_FROM_FRD;
+    let in_enu = |q: DQuat| enu_from_flu(reorder(enu_from_flu(q)));
     attitudes.iter().map(|&q| if reading.is_enu { in_enu(q) } else { reorder(q) }).collect()
 }
 

@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use camsim_core::pose::{ENU_FROM_NED, FLU_FROM_FRD};
-
 use super::{
     super::{
         DatasetError, ExportJob, RunFolder,
-        axes::{Rigid, enu},
+        axes::{Rigid, enu, enu_from_flu},
         csv_rows::CsvRows,
         imu::{ImuRow, ImuRows, ImuSensor, descriptions},
         run_folder::{PlatformRows, PlatformState},
@@ -38,7 +36,7 @@ impl Source for TruePoses {
     fn send(&mut self, bag: &mut Bag<'_>) -> Result<(), DatasetError> {
         let Some(state) = self.next else { return Ok(()) };
         let pose = Rigid {
-            rotation: (ENU_FROM_NED * state.ned_from_body * FLU_FROM_FRD).normalize(),
+            rotation: enu_from_flu(state.ned_from_body).normalize(),
             translation_m: enu(state.position_ned_m),
         };
         let moved = StampedTransform::new(state.t_ns, "map", "base_link", &pose);
