@@ -5,7 +5,10 @@ use glam::DVec3;
 use numpy::{
     Element, IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{
+    prelude::*,
+    types::{PyDict, PyList},
+};
 
 use crate::error::input_error;
 
@@ -34,6 +37,7 @@ pub fn columns<'py, R: TableRow>(py: Python<'py>, rows: &[R]) -> PyResult<Bound<
     let dict = PyDict::new(py);
     for Column { array, get, .. } in R::COLUMNS {
         let values = match get {
+            Get::Text(get) => PyList::new(py, rows.iter().map(get))?.into_any(),
             Get::Index(get) => column(py, rows, get),
             Get::Whole(get) => column(py, rows, get),
             Get::Flag(get) => column(py, rows, get),

@@ -1,7 +1,7 @@
-//! Columns of the tables of samples. Each table has one list, from which come the files, the arrays in Python and
+//! Columns of tables. Each table has one list, from which come the files, what reads them, the arrays in Python and
 //! docs/reference/COLUMNS.md.
 
-use std::fmt::Write as _;
+use std::{borrow::Cow, fmt::Write as _};
 
 use camsim_core::{mount::CameraPath, pose::CameraPose};
 use glam::{DQuat, DVec3};
@@ -9,6 +9,7 @@ use glam::{DQuat, DVec3};
 use crate::write::Number;
 
 mod lists;
+pub(crate) use lists::{T_NS, T_S, T_TRUE_NS};
 #[cfg(test)]
 mod tests;
 
@@ -29,12 +30,38 @@ pub struct Column<R> {
     pub about: &'static str,
     /// Its value.
     pub get: Get<R>,
+    /// What a table is about that has it; `None`: every table of its kind has it.
+    part: Option<Part>,
+}
+
+/// What not every table of a kind is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Places on Earth.
+    Places,
+    /// Exposures that differ.
+    Exposures,
+    /// Pictures of a burst.
+    Instants,
+    /// Things that move.
+    Motion,
+    /// Poses of samples.
+    Poses,
+}
+
+/// A cell of a row.
+pub(crate) enum Cell<'a> {
+    Text(&'a str),
+    Whole(i64),
+    Number(f64),
+    Empty,
 }
 
 /// How a row gives the value of a column, and which type that has. What is absent is an empty cell, and NaN in Python.
 #[derive(Debug)]
 #[allow(missing_docs, reason = "the names say it")]
 pub enum Get<R> {
+    Text(fn(&R) -> &str),
     Index(fn(&R) -> u32),
     Whole(fn(&R) -> i64),
     Flag(fn(&R) -> bool),
@@ -46,18 +73,29 @@ pub enum Get<R> {
     Wxyz(fn(&R) -> DQuat),
 }
 
-const fn column<R>(array: &'static str, cells: &'static str, about: &'static str, get: Get<R>) -> Column<R> {
-    Column { array, cells, about, get }
+pub(crate) const fn column<R>(
+    array: &'static str,
+    cells: &'static str,
+    about: &'static str,
+    get: Get<R>,
+) -> Column<R> {
+    Column { array, cells, about, get, part: None }
 }
 
 /// A column with one name everywhere.
-const fn plain<R>(name: &'static str, about: &'static str, get: Get<R>) -> Column<R> {
+pub(crate) const fn plain<R>(name: &'static str, about: &'static str, get: Get<R>) -> Column<R> {
     column(name, name, about, get)
+}
+
+/// A column of those tables alone that are about this.
+pub(crate) const fn of<R>(part: Part, mut column: Column<R>) -> Column<R> {
+    column.part = Some(part);
+    column
 }
 
 impl<R> Column<R> {
     /// Names of its cells in files.
-    fn names(&self) -> impl Iterator<Item = String> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = String> {
         let axes: &[&str] = match self.get {
             Get::Xyz(_) => &["x", "y", "z"],
             Get::Ned(_) | Get::MaybeNed(_) => &["n", "e", "d"],
@@ -67,50 +105,96 @@ impl<R> Column<R> {
         axes.iter().map(|axis| self.cells.replace('*', axis))
     }
 
-    /// Appends its cells, each with a comma behind it.
-    fn push(&self, row: &R, text: &mut String) {
+    /// Calls `put` with each of its cells.
+    fn each_cell(&self, row: &R, put: &mut dyn FnMut(Cell<'_>)) {
+        let mut numbers = |values: &[f64]| values.iter().for_each(|value| put(Cell::Number(*value)));
         match &self.get {
-            Get::Index(get) => push_whole(text, get(row).into()),
-            Get::Whole(get) => push_whole(text, get(row)),
-            Get::Flag(get) => push_whole(text, get(row).into()),
-            Get::Number(get) => push_numbers(text, &[get(row)]),
-            Get::Xyz(get) | Get::Ned(get) => push_numbers(text, &get(row).to_array()),
-            Get::Wxyz(get) => push_numbers(text, &wxyz(get(row))),
-            Get::MaybeNumber(get) => match get(row) {
-                Some(value) => push_numbers(text, &[value]),
-                None => text.push(','),
-            },
+            Get::Number(get) => numbers(&[get(row)]),
+            Get::Xyz(get) | Get::Ned(get) => numbers(&get(row).to_array()),
+            Get::Wxyz(get) => numbers(&wxyz(get(row))),
+            Get::Text(get) => put(Cell::Text(get(row))),
+            Get::Index(get) => put(Cell::Whole(get(row).into())),
+            Get::Whole(get) => put(Cell::Whole(get(row))),
+            Get::Flag(get) => put(Cell::Whole(get(row).into())),
+            Get::MaybeNumber(get) => put(get(row).map_or(Cell::Empty, Cell::Number)),
             Get::MaybeNed(get) => match get(row) {
-                Some(value) => push_numbers(text, &value.to_array()),
-                None => text.push_str(",,,"),
+                Some(value) => numbers(&value.to_array()),
+                None => (0..3).for_each(|_| put(Cell::Empty)),
             },
         }
     }
 }
 
-/// Names of the cells of columns, with commas between them.
-pub(crate) fn header<R>(columns: &[Column<R>]) -> String {
-    columns.iter().flat_map(Column::names).collect::<Vec<_>>().join(",")
-}
+/// The columns that one table has.
+pub(crate) struct Columns<R: 'static>(Vec<&'static Column<R>>);
 
-/// Appends the cells of a row, and ends the line.
-pub(crate) fn push_line<R>(text: &mut String, columns: &[Column<R>], row: &R) {
-    for column in columns {
-        column.push(row, text);
+impl<R: TableRow> Columns<R> {
+    /// Those of every table, and of the parts that this one has.
+    pub(crate) fn with(has: impl Fn(Part) -> bool) -> Self {
+        Self(R::COLUMNS.iter().filter(|column| column.part.is_none_or(&has)).collect())
     }
-    text.pop();
-    text.push('\n');
+
+    /// All columns.
+    pub(crate) fn all() -> Self {
+        Self::with(|_| true)
+    }
+
+    /// Names of their cells.
+    pub(crate) fn names(&self) -> impl Iterator<Item = String> {
+        self.0.iter().flat_map(|column| column.names())
+    }
+
+    /// The line of names.
+    pub(crate) fn header(&self) -> String {
+        self.names().collect::<Vec<_>>().join(",")
+    }
+
+    /// Calls `put` with each cell of a row.
+    pub(crate) fn each_cell(&self, row: &R, put: &mut dyn FnMut(Cell<'_>)) {
+        self.0.iter().for_each(|column| column.each_cell(row, put));
+    }
+
+    /// Appends the cells of a row, with commas between them.
+    pub(crate) fn push_cells(&self, text: &mut String, row: &R) {
+        self.each_cell(row, &mut |cell| {
+            match cell {
+                Cell::Text(value) => text.push_str(&csv_cell(value)),
+                // Writing to a String cannot fail.
+                Cell::Whole(value) => _ = write!(text, "{value}"),
+                Cell::Number(value) => text.push_str(Number(value).digits(&mut zmij::Buffer::new())),
+                Cell::Empty => {}
+            }
+            text.push(',');
+        });
+        text.pop();
+    }
+
+    /// Appends the cells of a row, and ends the line.
+    pub(crate) fn push_line(&self, text: &mut String, row: &R) {
+        self.push_cells(text, row);
+        text.push('\n');
+    }
+
+    /// The table.
+    pub(crate) fn csv(&self, rows: impl IntoIterator<Item = R>) -> String {
+        let mut text = self.header() + "\n";
+        rows.into_iter().for_each(|row| self.push_line(&mut text, &row));
+        text
+    }
 }
 
-fn push_whole(text: &mut String, value: i64) {
-    // Writing to a String cannot fail.
-    let _ = write!(text, "{value},");
+/// Names of the cells in files of the column with this name.
+pub(crate) fn cells<R: TableRow>(array: &str) -> Vec<String> {
+    let column = R::COLUMNS.iter().find(|column| column.array == array);
+    column.map_or_else(|| vec![array.to_owned()], |column| column.names().collect())
 }
 
-fn push_numbers(text: &mut String, values: &[f64]) {
-    for value in values {
-        text.push_str(Number(*value).digits(&mut zmij::Buffer::new()));
-        text.push(',');
+/// A text as a cell of a CSV file: in quotes if it has commas, quotes or line breaks (RFC 4180).
+#[must_use]
+pub fn csv_cell(text: &str) -> Cow<'_, str> {
+    match text.contains(['"', ',', '\n', '\r']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")).into(),
+        false => text.into(),
     }
 }
 

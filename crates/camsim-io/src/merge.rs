@@ -13,7 +13,7 @@ use std::{
 
 use thiserror::Error;
 
-use crate::write::WriteError;
+use crate::write::{FRAMES_CSV, TRACKS_CSV, WriteError};
 
 mod checksums;
 mod runs;
@@ -95,7 +95,7 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<MergeReport, MergeError> 
             "run.json" => {
                 run_files.insert(file.clone());
             }
-            "frames.csv" | "tracks.csv" => tables::join(&sources, &target)?,
+            FRAMES_CSV | TRACKS_CSV => tables::join(&sources, &target)?,
             _ if sources.len() == 1 => {
                 link(&sources[0], &target)?;
                 report.files += 1;

@@ -71,19 +71,23 @@ pub use channel_pictures::channel_pictures;
 pub use encode::{luminance, srgb8};
 pub(crate) use exr_file::encode as encode_exr;
 pub use frame_table::{
-    FRAMES_COLUMNS, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path, listed_frames,
+    FRAMES_CSV, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path, listed_frames,
 };
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
 pub use numbers::Number;
+pub(crate) use numbers::seconds;
 pub use picture::write_picture;
 pub(crate) use png_file::encode as encode_png;
 pub use png_file::{contact_sheet, palette_rgb8};
 pub use rig::{RIG_TOML, rig_names, rig_toml, write_rig};
 pub(crate) use sensors::{KalibrFigures, SensorFile, imu_yaml};
 pub use sensors::{SENSORS_FOLDER, SensorSummary, kalibr_yaml, write_sensors};
-pub use tables::{OBJECTS_COLUMNS, Stamped, objects_csv, rows_csv, trajectory_csv};
+pub(crate) use tables::ObjectRecord;
+pub use tables::{OBJECTS_CSV, Stamped, TRAJECTORY_CSV, objects_csv, rows_csv, trajectory_csv};
+pub(crate) use timing::TimingRecord;
 pub use timing::{TIMING_CSV, timing_csv};
-pub use tracks::{GEODETIC_COLUMNS, POINTS_COLUMNS, TRACKS_COLUMNS, TrackFiles, points_csv, tracks_rows};
+pub use tracks::{POINTS_CSV, TRACKS_CSV, TrackFiles, points_csv, tracks_rows};
+pub(crate) use tracks::{PointRecord, TrackRecord};
 pub use variations::{VARIATIONS_CSV, VariationsError, variation_folder, write_variations};
 pub use video::Y4mStream;
 

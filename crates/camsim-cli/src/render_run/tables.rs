@@ -18,8 +18,9 @@ use camsim_io::{
     columns::CameraState,
     portable::write_camera,
     write::{
-        FrameRecord, FrameTable, SENSORS_FOLDER, SourceFrame, Stamped, TIMING_CSV, TableKind, WriteError,
-        frames_path, listed_frames, objects_csv, timing_csv, trajectory_csv, write_atomic, write_sensors,
+        FrameRecord, FrameTable, OBJECTS_CSV, SENSORS_FOLDER, SourceFrame, Stamped, TIMING_CSV,
+        TRAJECTORY_CSV, TableKind, WriteError, frames_path, listed_frames, objects_csv, timing_csv,
+        trajectory_csv, write_atomic, write_sensors,
     },
 };
 use camsim_plan::{FramePlan, Planner};
@@ -38,11 +39,7 @@ const MOST_TRAJECTORY_ROWS: f64 = 10e6;
 /// Tables of motion that are larger are told before the first frame.
 const MUCH_BYTES: u64 = 20_000_000;
 
-const TRAJECTORY_CSV: &str = "trajectory.csv";
 const CAMERA_TRAJECTORY_CSV: &str = "camera_trajectory.csv";
-
-/// The table of objects.
-const OBJECTS_CSV: &str = "objects.csv";
 
 /// Whether a scenario writes numbers of objects or classes.
 fn numbers_objects(scenario: &Scenario) -> bool {

@@ -2,6 +2,8 @@
 
 use glam::DQuat;
 
+use crate::columns;
+
 /// A number with a decimal point and without an exponent, as OpenCV's and ORB-SLAM3's readers want reals. YAML 1.1,
 /// which Kalibr's follows, takes `1e-5` for a text.
 pub(crate) fn real(value: f64) -> String {
@@ -44,22 +46,20 @@ pub(crate) fn opencv_matrix(
     format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: {dt}\n   data: {data}\n")
 }
 
-/// Scalar first, not negative: q and -q are the same rotation.
+/// The same rotation, with a scalar that is not negative.
+pub(crate) fn upright(q: DQuat) -> DQuat {
+    if q.w < 0.0 { -q } else { q }
+}
+
+/// Scalar first, not negative.
 pub(crate) fn wxyz(q: DQuat) -> [f64; 4] {
-    let q = if q.w < 0.0 { -q } else { q };
-    [q.w, q.x, q.y, q.z]
+    columns::wxyz(upright(q))
 }
 
 /// Scalar last, not negative.
 pub(crate) fn xyzw(q: DQuat) -> [f64; 4] {
     let [w, x, y, z] = wxyz(q);
     [x, y, z, w]
-}
-
-/// Decimal seconds with all nine decimals.
-pub(crate) fn seconds(t_ns: i64) -> String {
-    let (whole, rest) = (t_ns.unsigned_abs() / 1_000_000_000, t_ns.unsigned_abs() % 1_000_000_000);
-    format!("{}{whole}.{rest:09}", if t_ns < 0 { "-" } else { "" })
 }
 
 /// The number with the fewest decimals within a tolerance.
@@ -89,6 +89,5 @@ mod tests {
         assert_eq!(list(&[435.0, -0.25, 1e-7, 0.0]), "[435.0, -0.25, 0.0000001, 0.0]");
         assert_eq!(wxyz(DQuat::from_xyzw(0.1, 0.2, 0.3, -0.9)), [0.9, -0.1, -0.2, -0.3]);
         assert_eq!(xyzw(DQuat::from_xyzw(0.1, 0.2, 0.3, 0.9)), [0.1, 0.2, 0.3, 0.9]);
-        assert_eq!([seconds(-1), seconds(1_000_000_123)], ["-0.000000001", "1.000000123"]);
     }
 }

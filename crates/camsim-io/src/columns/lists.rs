@@ -8,9 +8,18 @@ use camsim_core::{
 
 use super::{
     CameraState, Column,
-    Get::{Flag, Index, MaybeNed, MaybeNumber, Ned, Number, Whole, Wxyz, Xyz},
-    TableRow, column, plain,
+    Get::{Flag, Index, MaybeNed, MaybeNumber, Ned, Number, Text, Whole, Wxyz, Xyz},
+    Part::{Exposures, Instants, Motion, Places},
+    TableRow, column, of, plain,
 };
+use crate::write::{FrameRecord, ObjectRecord, PointRecord, TimingRecord, TrackRecord};
+
+/// The column before those of trajectories, in seconds; in Python the argument.
+pub(crate) const T_S: &str = "t_s";
+/// Stamps of all sensors.
+pub(crate) const T_NS: &str = "t_ns";
+/// True instants of all sensors; true values stand behind it.
+pub(crate) const T_TRUE_NS: &str = "t_true_ns";
 
 const STAMP: &str = "stamp by the sensor's clock";
 const INSTANT: &str = "instant on the clock of frames";
@@ -27,8 +36,177 @@ impl TableRow for RowRecord {
         column("position_ned_m", "*", "the optical centre then", Ned(|row| row.position_ned_m)),
         column("ned_from_camera_wxyz", "q*", "attitude of the camera", Wxyz(|row| row.ned_from_camera)),
         column("velocity_ned_m_s", "v*", "of the optical centre", Ned(|row| row.velocity_ned_m_s)),
-        // Files have it only where rows differ in it: `rows_csv` counts on its place at the end.
-        plain("exposure_ns", "exposure time; in files where rows differ in it", Whole(|row| row.exposure_ns)),
+        of(
+            Exposures,
+            plain(
+                "exposure_ns",
+                "exposure time; in files where rows differ in it",
+                Whole(|row| row.exposure_ns),
+            ),
+        ),
+    ];
+}
+
+impl TableRow for FrameRecord {
+    const COLUMNS: &'static [Column<Self>] = &[
+        plain("frame", "number of the frame", Whole(|row| row.frame as i64)),
+        plain("stamp_ns", "stamp on the camera's clock", Whole(|row| row.stamp_ns)),
+        column("position_ned_m", "*", "the optical centre at the stamp", Ned(|row| row.pose.position_ned_m)),
+        column(
+            "ned_from_camera_wxyz",
+            "q*",
+            "attitude of the camera at the stamp",
+            Wxyz(|row| row.pose.ned_from_camera),
+        ),
+        plain(
+            "ideal_width_px",
+            "width of the pinhole frame that `x y` of `coords` are pixels of",
+            Index(|row| row.source.size_px[0]),
+        ),
+        plain("ideal_height_px", "its height", Index(|row| row.source.size_px[1])),
+        plain("ideal_fx_px", "its focal length", Number(|row| row.source.focal_px[0])),
+        plain("ideal_fy_px", "its focal length", Number(|row| row.source.focal_px[1])),
+        plain("ideal_cx_px", "its principal point", Number(|row| row.source.principal_px[0])),
+        plain("ideal_cy_px", "its principal point", Number(|row| row.source.principal_px[1])),
+        plain("ideal_t_ns", "its instant on the clock of stamps", Whole(|row| row.source.t_ns)),
+        column(
+            "ideal_position_ned_m",
+            "ideal_*",
+            "its optical centre",
+            Ned(|row| row.source.pose.position_ned_m),
+        ),
+        column(
+            "ideal_ned_from_camera_wxyz",
+            "ideal_q*",
+            "its attitude",
+            Wxyz(|row| row.source.pose.ned_from_camera),
+        ),
+        of(
+            Places,
+            plain(
+                "lat_deg",
+                "of the camera at the stamp (WGS-84), with an origin on Earth (a log of latitudes and longitudes, or \
+             `flight.origin`)",
+                MaybeNumber(|row| Some(row.place?.lat_deg())),
+            ),
+        ),
+        of(Places, plain("lon_deg", "likewise", MaybeNumber(|row| Some(row.place?.lon_deg())))),
+        of(
+            Places,
+            plain(
+                "height_m",
+                "likewise, in the vertical datum of `flight.origin`",
+                MaybeNumber(|row| Some(row.place?.height_m)),
+            ),
+        ),
+        of(
+            Exposures,
+            plain(
+                "exposure_ms",
+                "exposure time, with `[camera.auto_exposure]`",
+                MaybeNumber(|row| Some(1e3 * row.exposure?.time_s)),
+            ),
+        ),
+        of(
+            Exposures,
+            plain(
+                "gain",
+                "gain of the signal, with `[camera.auto_exposure]`",
+                MaybeNumber(|row| Some(row.exposure?.gain)),
+            ),
+        ),
+        of(
+            Instants,
+            plain("instant", "number within the frame's burst", MaybeNumber(|row| Some(row.instant?.into()))),
+        ),
+    ];
+}
+
+impl TableRow for TimingRecord {
+    const COLUMNS: &'static [Column<Self>] = &[
+        plain("frame", "number of the frame", Whole(|row| row.frame as i64)),
+        plain("delivery", "`own`, `dropped`, `doubled` or `missed`", Text(|row| row.delivery)),
+        plain("picture", "number of the frame whose picture it shows", Whole(|row| row.picture as i64)),
+        plain(
+            "nominal_ns",
+            "when it was meant to be triggered, on the clock of trajectories",
+            Whole(|row| row.nominal_ns),
+        ),
+        plain(
+            "trigger_ns",
+            "when its picture was triggered, on the clock of trajectories. Row times are relative to it, as they are \
+             to the stamp of a faultless camera",
+            Whole(|row| row.trigger_ns),
+        ),
+        plain("stamp_ns", "what the camera writes", Whole(|row| row.stamp_ns)),
+    ];
+}
+
+impl TableRow for ObjectRecord {
+    const COLUMNS: &'static [Column<Self>] = &[
+        plain("number", "what `object` has, from 1", Index(|row| row.number)),
+        plain("name", "its name, which need not be its own alone", Text(|row| &row.object.name)),
+        plain("class", "what `class` has; 0 = none", Index(|row| row.object.class.into())),
+    ];
+}
+
+impl TableRow for PointRecord {
+    const COLUMNS: &'static [Column<Self>] = &[
+        plain("point", "number of the point, from 0", Index(|row| row.number)),
+        plain("name", "its name in its source", Text(|row| &row.point.name)),
+        plain(
+            "source",
+            "`terrain`, `vertices`, `board` or the name of a table",
+            Text(|row| &row.point.source),
+        ),
+        column("position_ned_m", "*_m", "its position", Ned(|row| row.point.position_ned_m)),
+        of(
+            Motion,
+            plain(
+                "moves",
+                "1 for a corner of a model that moves: its position is that at path time 0, and its track follows it; if \
+             any point does",
+                Flag(|row| row.point.moves_with.is_some()),
+            ),
+        ),
+        of(
+            Places,
+            plain(
+                "lat_deg",
+                "its place, where the log has an origin",
+                MaybeNumber(|row| Some(row.place?[0])),
+            ),
+        ),
+        of(Places, plain("lon_deg", "likewise", MaybeNumber(|row| Some(row.place?[1])))),
+        of(
+            Places,
+            plain("height_m", "likewise, as heights of the log", MaybeNumber(|row| Some(row.place?[2]))),
+        ),
+    ];
+}
+
+impl TableRow for TrackRecord {
+    const COLUMNS: &'static [Column<Self>] = &[
+        plain("frame", "number in `frames.csv`", Whole(|row| row.frame as i64)),
+        plain("point", "number in `points.csv`", Whole(|row| row.sighting.point as i64)),
+        plain(
+            "x_px",
+            "pixel coordinate; 0, 0 is the centre of the first pixel",
+            Number(|row| row.sighting.seen.px.x),
+        ),
+        plain("y_px", "likewise", Number(|row| row.sighting.seen.px.y)),
+        plain("t_ns", "instant at which the point is seen, on the clock of stamps", Whole(|row| row.t_ns)),
+        plain(
+            "depth_m",
+            "planar depth in the camera of that instant",
+            Number(|row| row.sighting.seen.depth_m),
+        ),
+        plain("visible", "0 if a surface is in front of the point", Flag(|row| row.sighting.is_visible)),
+        plain(
+            "solutions",
+            "positions at which this frame shows the point, each with a line of its own",
+            Index(|row| row.sighting.seen.solutions),
+        ),
     ];
 }
 
@@ -59,10 +237,10 @@ impl TableRow for CameraState {
 
 impl TableRow for ImuSample {
     const COLUMNS: &'static [Column<Self>] = &[
-        plain("t_ns", STAMP, Whole(|imu| imu.time.stamp_ns)),
+        plain(T_NS, STAMP, Whole(|imu| imu.time.stamp_ns)),
         column("gyro_rad_s", "gyro_*_rad_s", "measured rate", Xyz(|imu| imu.gyro_rad_s)),
         column("accel_m_s2", "accel_*_m_s2", "measured specific force", Xyz(|imu| imu.accel_m_s2)),
-        plain("t_true_ns", INSTANT, Whole(|imu| imu.time.true_ns)),
+        plain(T_TRUE_NS, INSTANT, Whole(|imu| imu.time.true_ns)),
         column("true_gyro_rad_s", "true_gyro_*_rad_s", "true rate", Xyz(|imu| imu.true_gyro_rad_s)),
         column("true_accel_m_s2", "true_accel_*_m_s2", "true specific force", Xyz(|imu| imu.true_accel_m_s2)),
         column("gyro_bias_rad_s", "gyro_bias_*_rad_s", "its bias", Xyz(|imu| imu.gyro_bias_rad_s)),
@@ -81,7 +259,7 @@ impl TableRow for ImuSample {
 
 impl TableRow for GnssSample {
     const COLUMNS: &'static [Column<Self>] = &[
-        plain("t_ns", STAMP, Whole(|gnss| gnss.time.stamp_ns)),
+        plain(T_NS, STAMP, Whole(|gnss| gnss.time.stamp_ns)),
         column("has_fix", "fix", "0 within a dropout", Flag(|gnss| gnss.fix.is_some())),
         plain("lat_deg", "measured", MaybeNumber(|gnss| Some(gnss.fix?.at.lat_deg()))),
         plain("lon_deg", "measured", MaybeNumber(|gnss| Some(gnss.fix?.at.lon_deg()))),
@@ -94,7 +272,7 @@ impl TableRow for GnssSample {
             "when the fix is there, by the sensor's clock",
             Whole(|gnss| gnss.available_ns),
         ),
-        plain("t_true_ns", INSTANT, Whole(|gnss| gnss.time.true_ns)),
+        plain(T_TRUE_NS, INSTANT, Whole(|gnss| gnss.time.true_ns)),
         plain("true_lat_deg", "true", Number(|gnss| gnss.truth.at.lat_deg())),
         plain("true_lon_deg", "true", Number(|gnss| gnss.truth.at.lon_deg())),
         plain("true_height_m", "true", Number(|gnss| gnss.truth.at.height_m)),
@@ -106,14 +284,14 @@ impl TableRow for GnssSample {
 
 impl TableRow for BarometerSample {
     const COLUMNS: &'static [Column<Self>] = &[
-        plain("t_ns", STAMP, Whole(|air| air.time.stamp_ns)),
+        plain(T_NS, STAMP, Whole(|air| air.time.stamp_ns)),
         plain("pressure_pa", "measured", Number(|air| air.pressure_pa)),
         plain(
             "altitude_m",
             "height where the standard atmosphere has the measured pressure",
             Number(|air| air.altitude_m),
         ),
-        plain("t_true_ns", INSTANT, Whole(|air| air.time.true_ns)),
+        plain(T_TRUE_NS, INSTANT, Whole(|air| air.time.true_ns)),
         plain("true_pressure_pa", "true", Number(|air| air.true_pressure_pa)),
         plain("true_msl_m", "true height above sea level", Number(|air| air.true_msl_m)),
         plain("bias_pa", "error without the white noise", Number(|air| air.bias_pa)),
@@ -122,9 +300,9 @@ impl TableRow for BarometerSample {
 
 impl TableRow for MagnetometerSample {
     const COLUMNS: &'static [Column<Self>] = &[
-        plain("t_ns", STAMP, Whole(|field| field.time.stamp_ns)),
+        plain(T_NS, STAMP, Whole(|field| field.time.stamp_ns)),
         column("mag_ut", "mag_*_ut", "measured", Xyz(|field| field.mag_ut)),
-        plain("t_true_ns", INSTANT, Whole(|field| field.time.true_ns)),
+        plain(T_TRUE_NS, INSTANT, Whole(|field| field.time.true_ns)),
         column("true_mag_ut", "true_mag_*_ut", "true, in sensor axes", Xyz(|field| field.true_mag_ut)),
         column("field_ned_ut", "field_*_ut", "true", Ned(|field| field.field_ned_ut)),
     ];

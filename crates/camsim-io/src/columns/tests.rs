@@ -9,19 +9,22 @@ use camsim_core::{
 };
 
 use super::*;
+use crate::write::{FrameRecord, ObjectRecord, PointRecord, TimingRecord, TrackRecord};
 
 const HEAD: &str = "\
 # Columns of tables
 
 Made from the lists of columns by `CAMSIM_BLESS=1 cargo test -p camsim-io --lib columns`. Numbers in \
-files have the fewest digits that read back to the same bits, flags are 0 or 1. In Python each line is one array, of a \
-value or a vector for each row. What is not measured is an empty cell in files, and NaN in Python. n, e, d are north, \
+files have the fewest digits that read back to the same bits, flags are 0 or 1. In Python, which has some of the \
+tables, each line is one array, of a value or a vector for each row. What is not measured is an empty cell in files, and NaN in Python. n, e, d are north, \
 east, down; x, y, z are the axes of body, camera or sensor, from which quaternions (scalar first) lead to north, east, \
 down.
 ";
 
 /// Units by the ends of names, the longer ones first.
-const UNITS: [(&str, &str); 10] = [
+const UNITS: [(&str, &str); 12] = [
+    ("_px", "px"),
+    ("_ms", "ms"),
     ("_rad_s2", "rad/s^2"),
     ("_rad_s", "rad/s"),
     ("_m_s2", "m/s^2"),
@@ -41,6 +44,7 @@ fn unit(array: &str) -> &'static str {
 /// numpy's type of a column.
 fn dtype<R>(column: &Column<R>) -> &'static str {
     match column.get {
+        Get::Text(_) => "str",
         Get::Index(_) => "uint32",
         Get::Whole(_) => "int64",
         Get::Flag(_) => "bool",
@@ -48,14 +52,27 @@ fn dtype<R>(column: &Column<R>) -> &'static str {
     }
 }
 
+fn cell_names<R>(column: &Column<R>) -> Vec<String> {
+    column.names().map(|name| format!("`{name}`")).collect()
+}
+
+/// Adds a table that is a file alone.
+fn add_file<R: TableRow>(page: &mut String, title: &str, file: &str) {
+    *page += &format!("\n## {title}\n\n`{file}`.\n\n| column | unit | what |\n|---|---|---|\n");
+    for column in R::COLUMNS {
+        *page +=
+            &format!("| {} | {} | {} |\n", cell_names(column).join(" "), unit(column.array), column.about);
+    }
+}
+
 fn add_table<R: TableRow>(page: &mut String, title: &str, file: &str, python: &str) {
     *page += &format!("\n## {title}\n\n`{file}`; in Python `{python}`.\n\n");
     *page += "| file | Python | unit | what |\n|---|---|---|---|\n";
     if file.contains("trajectory") {
-        *page += "| `t_s` | | s | instant on the clock of stamps, in Python the argument |\n";
+        *page += &format!("| `{T_S}` | | s | instant on the clock of stamps, in Python the argument |\n");
     }
     for column in R::COLUMNS {
-        let names: Vec<String> = column.names().map(|name| format!("`{name}`")).collect();
+        let names = cell_names(column);
         let width = if names.len() > 1 { format!(", N x {}", names.len()) } else { String::new() };
         let Column { array, about, .. } = column;
         let (names, dtype, unit) = (names.join(" "), dtype(column), unit(array));
@@ -73,6 +90,12 @@ fn the_page_is_up_to_date() {
     add_table::<GnssSample>(page, "gnss", "sensors/NAME.csv", "scenario.gnss()");
     add_table::<BarometerSample>(page, "barometer", "sensors/NAME.csv", "scenario.barometer()");
     add_table::<MagnetometerSample>(page, "magnetometer", "sensors/NAME.csv", "scenario.magnetometer()");
+    add_file::<FrameRecord>(page, "Frames", "frames.csv");
+    *page += "| `color_png`, ... | | path of each file of the frame, empty if it is missing |\n";
+    add_file::<TimingRecord>(page, "Timing", "timing.csv");
+    add_file::<ObjectRecord>(page, "Objects", "objects.csv");
+    add_file::<PointRecord>(page, "Points", "points.csv");
+    add_file::<TrackRecord>(page, "Tracks", "tracks.csv");
     crate::inputs_page::check("../COLUMNS.md", page);
 }
 

@@ -8,30 +8,33 @@ use std::{
 use glam::{DQuat, DVec3};
 
 use super::DatasetError;
+use crate::columns::{TableRow, cells};
 
 /// A table that is read from its begin to its end.
 pub(super) struct CsvRows {
     path: PathBuf,
     reader: csv::Reader<File>,
     header: csv::StringRecord,
-    columns: Vec<usize>,
+    /// Places of the cells of each asked column.
+    columns: Vec<Vec<usize>>,
     record: csv::StringRecord,
 }
 
 impl CsvRows {
-    /// Opens a table with these columns.
-    pub(super) fn open(path: &Path, columns: &[&str]) -> Result<Self, DatasetError> {
+    /// Opens a table with these columns of its list, by their names in Python.
+    pub(super) fn open<R: TableRow>(path: &Path, columns: &[&str]) -> Result<Self, DatasetError> {
         let fail = |message: String| DatasetError::Input { path: path.into(), message };
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(|error| {
             fail(format!("cannot be read: {error}; render the folder again with --resume"))
         })?;
         let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
-        let place = |name: &&str| {
-            header.iter().position(|column| column == *name).ok_or_else(|| {
+        let place = |name: String| {
+            header.iter().position(|column| column == name).ok_or_else(|| {
                 fail(format!("has no column {name}: it is not a table of this version of camsim"))
             })
         };
-        let columns = columns.iter().map(place).collect::<Result<_, _>>()?;
+        let places = |column: &&str| cells::<R>(column).into_iter().map(place).collect();
+        let columns = columns.iter().map(places).collect::<Result<_, _>>()?;
         Ok(Self { path: path.into(), reader, header, columns, record: csv::StringRecord::new() })
     }
 
@@ -53,14 +56,14 @@ impl CsvRows {
         self.record.get(place).unwrap_or_default()
     }
 
-    /// The cell of the i-th of the asked columns.
+    /// The first cell of the i-th of the asked columns.
     pub(super) fn text(&self, i: usize) -> &str {
-        self.cell(self.columns[i])
+        self.cell(self.columns[i][0])
     }
 
-    fn bad(&self, i: usize, wanted: &str) -> DatasetError {
+    fn bad(&self, place: usize, wanted: &str) -> DatasetError {
         let line = self.record.position().map_or(0, csv::Position::line);
-        let (name, text) = (self.header.get(self.columns[i]).unwrap_or_default(), self.text(i));
+        let (name, text) = (self.header.get(place).unwrap_or_default(), self.cell(place));
         DatasetError::Input {
             path: self.path.clone(),
             message: format!(
@@ -69,30 +72,40 @@ impl CsvRows {
         }
     }
 
+    /// Finite numbers, as many as the i-th column has cells.
+    fn numbers<const N: usize>(&self, i: usize) -> Result<[f64; N], DatasetError> {
+        let mut values = [0.0; N];
+        for (value, &place) in values.iter_mut().zip(&self.columns[i]) {
+            let finite = self.cell(place).parse().ok().filter(|value: &f64| value.is_finite());
+            *value = finite.ok_or_else(|| self.bad(place, "a number"))?;
+        }
+        Ok(values)
+    }
+
     /// A finite number.
     pub(super) fn number(&self, i: usize) -> Result<f64, DatasetError> {
-        let value: Option<f64> = self.text(i).parse().ok();
-        value.filter(|value| value.is_finite()).ok_or_else(|| self.bad(i, "a number"))
+        let [value] = self.numbers(i)?;
+        Ok(value)
     }
 
     /// A whole number.
     pub(super) fn whole<T: std::str::FromStr>(&self, i: usize) -> Result<T, DatasetError> {
-        self.text(i).parse().map_err(|_| self.bad(i, "a whole number"))
+        self.text(i).parse().map_err(|_| self.bad(self.columns[i][0], "a whole number"))
     }
 
     /// Decimal seconds as nanoseconds, exactly.
     pub(super) fn seconds_ns(&self, i: usize) -> Result<i64, DatasetError> {
-        nanoseconds(self.text(i)).ok_or_else(|| self.bad(i, "a time in seconds"))
+        nanoseconds(self.text(i)).ok_or_else(|| self.bad(self.columns[i][0], "a time in seconds"))
     }
 
-    /// Three numbers that begin at the i-th column.
+    /// A vector.
     pub(super) fn vector(&self, i: usize) -> Result<DVec3, DatasetError> {
-        Ok(DVec3::new(self.number(i)?, self.number(i + 1)?, self.number(i + 2)?))
+        Ok(DVec3::from_array(self.numbers(i)?))
     }
 
-    /// A quaternion w, x, y, z that begins at the i-th column.
+    /// A quaternion.
     pub(super) fn wxyz(&self, i: usize) -> Result<DQuat, DatasetError> {
-        let [w, x, y, z] = [self.number(i)?, self.number(i + 1)?, self.number(i + 2)?, self.number(i + 3)?];
+        let [w, x, y, z] = self.numbers(i)?;
         Ok(DQuat::from_xyzw(x, y, z, w))
     }
 }
@@ -113,6 +126,8 @@ fn nanoseconds(text: &str) -> Option<i64> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use camsim_core::pose::BodyState;
 
     use super::*;
 
@@ -137,14 +152,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         std::fs::write(&path, "x,y\n1,2\n3,nan\n").unwrap();
-        let mut rows = CsvRows::open(&path, &["y"]).unwrap();
+        let mut rows = CsvRows::open::<BodyState>(&path, &["y"]).unwrap();
         assert!(rows.advance().unwrap());
         assert_eq!(rows.number(0).unwrap(), 2.0);
         assert!(rows.advance().unwrap());
         let text = rows.number(0).unwrap_err().to_string();
         assert!(text.contains("a.csv") && text.contains("line 3") && text.contains("y is \"nan\""), "{text}");
         assert!(!rows.advance().unwrap());
-        let text = CsvRows::open(&path, &["z"]).err().unwrap().to_string();
+        let text = CsvRows::open::<BodyState>(&path, &["z"]).err().unwrap().to_string();
         assert!(text.contains("no column z"), "{text}");
     }
 }

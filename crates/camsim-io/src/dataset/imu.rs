@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use camsim_core::{pose::FLU_FROM_FRD, scenario::SensorCarrier};
+use camsim_core::{pose::FLU_FROM_FRD, scenario::SensorCarrier, sensors::ImuSample};
 use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 
 use super::{DatasetError, RunCamera, RunFolder, axes::Rigid, csv_rows::CsvRows, run_folder::PlatformRows};
 use crate::{
     calibration::ImuReference,
+    columns::{T_NS, T_TRUE_NS},
     write::{KalibrFigures, SENSORS_FOLDER, SensorFile},
 };
 
@@ -126,28 +127,14 @@ pub(super) fn body_from_b(imu: Option<&ImuSensor>) -> Rigid {
     imu.map_or_else(|| Rigid::turn(FLU_FROM_FRD), |imu| imu.body_from_imu)
 }
 
-/// Columns of its table: stamp, gyroscope, accelerometer, their biases, true time.
-const COLUMNS: [&str; 14] = [
-    "t_ns",
-    "gyro_x_rad_s",
-    "gyro_y_rad_s",
-    "gyro_z_rad_s",
-    "accel_x_m_s2",
-    "accel_y_m_s2",
-    "accel_z_m_s2",
-    "gyro_bias_x_rad_s",
-    "gyro_bias_y_rad_s",
-    "gyro_bias_z_rad_s",
-    "accel_bias_x_m_s2",
-    "accel_bias_y_m_s2",
-    "accel_bias_z_m_s2",
-    "t_true_ns",
-];
+/// Columns of its table that are read, as fields of a row.
+const COLUMNS: [&str; 6] =
+    [T_NS, T_TRUE_NS, "gyro_rad_s", "accel_m_s2", "gyro_bias_rad_s", "accel_bias_m_s2"];
 
 impl ImuSensor {
     /// Its measurements, row by row.
     pub(super) fn rows(&self) -> Result<ImuRows, DatasetError> {
-        Ok(ImuRows { rows: CsvRows::open(&self.path, &COLUMNS)?, shift_ns: self.shift_ns })
+        Ok(ImuRows { rows: CsvRows::open::<ImuSample>(&self.path, &COLUMNS)?, shift_ns: self.shift_ns })
     }
 
     /// Its noise for estimators, none of it 0, and the names of the figures that are 0 in truth.
@@ -227,14 +214,14 @@ impl ImuRows {
         if !rows.advance()? {
             return Ok(None);
         }
-        let [t_ns, true_ns]: [i64; 2] = [rows.whole(0)?, rows.whole(13)?];
+        let [t_ns, true_ns]: [i64; 2] = [rows.whole(0)?, rows.whole(1)?];
         Ok(Some(ImuRow {
             t_ns: t_ns.saturating_add(self.shift_ns),
             true_ns: true_ns.saturating_add(self.shift_ns),
-            gyro_rad_s: rows.vector(1)?,
-            acc_m_s2: rows.vector(4)?,
-            gyro_bias_rad_s: rows.vector(7)?,
-            acc_bias_m_s2: rows.vector(10)?,
+            gyro_rad_s: rows.vector(2)?,
+            acc_m_s2: rows.vector(3)?,
+            gyro_bias_rad_s: rows.vector(4)?,
+            acc_bias_m_s2: rows.vector(5)?,
         }))
     }
 }

@@ -13,7 +13,10 @@ use super::{
     stereo,
     twins::TwinNeed,
 };
-use crate::{calibration::ros::projection_matrix, write::Number};
+use crate::{
+    calibration::ros::projection_matrix,
+    write::{Number, seconds},
+};
 
 /// Steps per metre that readers have built in.
 const STEPS: f64 = 256.0;
@@ -104,7 +107,7 @@ fn write_odometry(job: &ExportJob<'_>, i: usize, sequence: &[&RunCamera]) -> Res
     job.target.stream(&name("times.txt"), &mut |out| {
         view.frames.iter().try_for_each(|frame| {
             let t_ns = view.centre_ns(frame) - first_ns;
-            Ok(writeln!(out, "{}", super::text::seconds(t_ns))?)
+            Ok(writeln!(out, "{}", seconds(t_ns))?)
         })
     })?;
     job.target.text(&name("calib.txt"), &calibration(sequence)?)?;

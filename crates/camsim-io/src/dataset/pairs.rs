@@ -3,7 +3,10 @@
 
 use std::fmt::Write as _;
 
-use camsim_core::scenario::{FlowInstant, OutputEncoding, Readout, Reset};
+use camsim_core::{
+    frame::RowRecord,
+    scenario::{FlowInstant, OutputEncoding, Readout, Reset},
+};
 use glam::{DQuat, DVec3};
 
 use super::{
@@ -167,10 +170,11 @@ fn depth_text(path: &std::path::Path) -> Result<Vec<u8>, DatasetError> {
 /// Angular rate and velocity from the first row to the last one, in the camera axes of the first row.
 fn velocity(camera: &RunCamera, frame: &RunFrame) -> Result<[DVec3; 2], DatasetError> {
     let path = camera.file(frame, "rows");
-    let mut rows = CsvRows::open(&path, &["t_mid_ns", "n", "e", "d", "qw", "qx", "qy", "qz"])?;
+    let mut rows =
+        CsvRows::open::<RowRecord>(&path, &["t_mid_ns", "position_ned_m", "ned_from_camera_wxyz"])?;
     let mut ends: Option<[(i64, DVec3, DQuat); 2]> = None;
     while rows.advance()? {
-        let row = (rows.whole(0)?, rows.vector(1)?, rows.wxyz(4)?);
+        let row = (rows.whole(0)?, rows.vector(1)?, rows.wxyz(2)?);
         ends = Some(ends.map_or([row; 2], |[first, _]| [first, row]));
     }
     match ends {

@@ -2,6 +2,8 @@
 
 use std::io::Write;
 
+use camsim_core::sensors::GnssSample;
+
 use super::{
     DatasetError, ExportJob,
     axes::Rigid,
@@ -9,6 +11,7 @@ use super::{
     imu::{SensorDescription, descriptions},
     text::{matrix_list, real},
 };
+use crate::columns::{T_NS, T_TRUE_NS};
 
 /// Writes `mav0/KINDn/{data.csv, sensor.yaml}` of all sensors but cameras and inertial ones; returns names of the tables.
 pub(super) fn write(job: &ExportJob<'_>, body_from_b: &Rigid) -> Result<Vec<String>, DatasetError> {
@@ -33,9 +36,10 @@ pub(super) fn write(job: &ExportJob<'_>, body_from_b: &Rigid) -> Result<Vec<Stri
 
 /// The columns before the true values.
 fn write_table(job: &ExportJob<'_>, sensor: &SensorDescription, name: &str) -> Result<(), DatasetError> {
-    let mut rows = CsvRows::open(&sensor.table, &["t_ns", "t_true_ns"])?;
+    // All sensors have these.
+    let mut rows = CsvRows::open::<GnssSample>(&sensor.table, &[T_NS, T_TRUE_NS])?;
     let columns: Vec<String> =
-        rows.header().iter().skip(1).take_while(|column| *column != "t_true_ns").map(str::to_owned).collect();
+        rows.header().iter().skip(1).take_while(|column| *column != T_TRUE_NS).map(str::to_owned).collect();
     job.target.stream(name, &mut |out| {
         writeln!(out, "#timestamp [ns],{}", columns.join(","))?;
         while rows.advance()? {

@@ -6,7 +6,7 @@ use camsim_core::scenario::DatasetFormat;
 use serde::{Deserialize, Serialize};
 
 use super::{DatasetError, ExportOptions, RunFolder};
-use crate::write::{WriteError, write_atomic};
+use crate::write::{FRAMES_CSV, POINTS_CSV, WriteError, write_atomic};
 
 /// Contents of `export.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,10 +102,10 @@ fn content(run: &RunFolder) -> Result<String, DatasetError> {
         Ok(())
     };
     for camera in &run.cameras {
-        add(&camera.folder.join("frames.csv"))?;
-        add(&camera.folder.join("points.csv"))?;
+        add(&camera.folder.join(FRAMES_CSV))?;
+        add(&camera.folder.join(POINTS_CSV))?;
         for twin in camera.twins() {
-            add(&camera.folder.join(&twin.name).join("frames.csv"))?;
+            add(&camera.folder.join(&twin.name).join(FRAMES_CSV))?;
         }
     }
     Ok(checksum(all.as_bytes()))

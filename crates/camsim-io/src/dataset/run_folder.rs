@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    pose::CameraPose,
+    frame::RowRecord,
+    pose::{BodyState, CameraPose},
     scenario::{CameraSpec, FieldOr, FlowInstant, TwinSpec},
+    sensors::ImuSample,
     shutter::Shutter,
     timing_faults::TimingFaults,
 };
@@ -14,8 +16,9 @@ use serde_json::Value;
 use super::{DatasetError, axes::Rigid, csv_rows::CsvRows};
 use crate::{
     calibration::{Calibration, Intrinsics},
+    columns::{Column, T_S, T_TRUE_NS, TableRow},
     manifest::RunManifest,
-    write::{RIG_TOML, rig_names},
+    write::{FRAMES_CSV, FrameRecord, RIG_TOML, TRAJECTORY_CSV, rig_names},
 };
 
 /// An output folder.
@@ -98,14 +101,14 @@ impl RunFolder {
         } else {
             let names = rig_names(path);
             // Those that --camera has left out have no folder.
-            let rendered = names.iter().filter(|name| path.join(name).join("frames.csv").is_file());
+            let rendered = names.iter().filter(|name| path.join(name).join(FRAMES_CSV).is_file());
             rendered.map(|name| RunCamera::open(&path.join(name), name.clone())).collect::<Result<_, _>>()?
         };
         if all.is_empty() {
             let message = "names no camera that has been rendered: render the folder again".to_owned();
             return Err(DatasetError::Input { path: path.join(RIG_TOML), message });
         }
-        let first_table = all[0].folder.join("frames.csv");
+        let first_table = all[0].folder.join(FRAMES_CSV);
         let (cameras, empty): (Vec<_>, Vec<_>) =
             all.into_iter().partition(|camera| !camera.frames.is_empty());
         if cameras.is_empty() {
@@ -153,7 +156,7 @@ impl RunFolder {
     /// The folder with what cameras and twins share: this one, or one above it.
     pub(super) fn shared_folder(&self) -> &Path {
         let above = self.path.ancestors().take(3);
-        let has_it = |path: &&Path| path.join(PLATFORM_TABLE).is_file() && path.join("run.json").is_file();
+        let has_it = |path: &&Path| path.join(TRAJECTORY_CSV).is_file() && path.join("run.json").is_file();
         above.into_iter().find(has_it).unwrap_or(&self.path)
     }
 
@@ -165,7 +168,7 @@ impl RunFolder {
 
     /// The motion of the platform, row by row.
     pub(super) fn platform(&self) -> Result<PlatformRows, DatasetError> {
-        PlatformRows::open(&self.shared_folder().join(PLATFORM_TABLE), self.shift_ns)
+        PlatformRows::open(&self.shared_folder().join(TRAJECTORY_CSV), self.shift_ns)
     }
 
     /// Number of frames of all cameras.
@@ -174,9 +177,6 @@ impl RunFolder {
         self.cameras.iter().map(|camera| camera.frames.len() as u64).sum()
     }
 }
-
-/// Motion of the platform.
-const PLATFORM_TABLE: &str = "trajectory.csv";
 
 /// Reads `run.json`.
 fn read_run(folder: &Path) -> Result<Value, DatasetError> {
@@ -197,7 +197,7 @@ impl RunCamera {
         let spec = manifest.scenario.camera.clone();
         let shutter =
             Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|e| fail(e.to_string()))?;
-        let (columns, frames) = read_frames(&folder.join("frames.csv"), spec.shutter.exposure_ms)?;
+        let (columns, frames) = read_frames(&folder.join(FRAMES_CSV), spec.shutter.exposure_ms)?;
         Ok(Self { name, folder: folder.into(), manifest, spec, shutter, frames, columns, shift_ns: 0 })
     }
 
@@ -308,14 +308,14 @@ impl RunCamera {
             return Ok(frame.pose);
         }
         self.require(format, &["rows"])?;
-        let mut rows =
-            CsvRows::open(&self.file(frame, "rows"), &["row", "n", "e", "d", "qw", "qx", "qy", "qz"])?;
+        let columns = ["row", "position_ned_m", "ned_from_camera_wxyz"];
+        let mut rows = CsvRows::open::<RowRecord>(&self.file(frame, "rows"), &columns)?;
         let (first, second, share) = self.shutter.centre_lines();
         let mut middle: Vec<(DVec3, DQuat)> = Vec::with_capacity(2);
         while rows.advance()? {
             let row: u32 = rows.whole(0)?;
             if row == first || row == second {
-                middle.push((rows.vector(1)?, rows.wxyz(4)?));
+                middle.push((rows.vector(1)?, rows.wxyz(2)?));
             }
         }
         let (Some(a), Some(b)) = (middle.first(), middle.last()) else {
@@ -360,17 +360,17 @@ impl RunCamera {
     }
 }
 
-/// Columns of `frames.csv` before those of files.
-const FRAME_COLUMNS: [&str; 9] = ["frame", "stamp_ns", "n", "e", "d", "qw", "qx", "qy", "qz"];
-
 /// Names of the columns of files, and the frames.
 fn read_frames(path: &Path, nominal_ms: f64) -> Result<(Vec<String>, Vec<RunFrame>), DatasetError> {
-    let mut rows = CsvRows::open(path, &FRAME_COLUMNS)?;
+    let columns = ["frame", "stamp_ns", "position_ned_m", "ned_from_camera_wxyz"];
+    let mut rows = CsvRows::open::<FrameRecord>(path, &columns)?;
     let header: Vec<String> = rows.header().iter().map(str::to_owned).collect();
     let place = |of: &str| header.iter().position(|name| name == of);
     let (instant, exposure) = (place("instant"), place("exposure_ms"));
-    let last = ["instant", "gain", "height_m", "ideal_qz"].into_iter().find_map(place).unwrap_or(0);
-    let columns = header.get(last + 1..).unwrap_or_default().to_vec();
+    // Those of values stand before them.
+    let values: Vec<String> = FrameRecord::COLUMNS.iter().flat_map(Column::names).collect();
+    let first = header.iter().take_while(|name| values.contains(name)).count();
+    let columns = header[first..].to_vec();
     let mut frames = Vec::new();
     while rows.advance()? {
         let own_ms = |place: usize| rows.cell(place).parse().ok();
@@ -378,10 +378,10 @@ fn read_frames(path: &Path, nominal_ms: f64) -> Result<(Vec<String>, Vec<RunFram
             number: rows.whole(0)?,
             instant: instant.and_then(|place| rows.cell(place).parse().ok()),
             stamp_ns: rows.whole(1)?,
-            pose: CameraPose { position_ned_m: rows.vector(2)?, ned_from_camera: rows.wxyz(5)? },
+            pose: CameraPose { position_ned_m: rows.vector(2)?, ned_from_camera: rows.wxyz(3)? },
             // Pictures of one instant have no exposure time, however long they collect light.
             exposure_ms: exposure.filter(|_| nominal_ms > 0.0).and_then(own_ms).unwrap_or(nominal_ms),
-            files: (0..columns.len()).map(|k| rows.cell(last + 1 + k).to_owned()).collect(),
+            files: (0..columns.len()).map(|k| rows.cell(first + k).to_owned()).collect(),
         });
     }
     Ok((columns, frames))
@@ -397,30 +397,15 @@ pub(super) struct PlatformRows {
 
 impl PlatformRows {
     fn open(path: &Path, shift_ns: i64) -> Result<Self, DatasetError> {
-        let columns =
-            ["t_s", "n_m", "e_m", "d_m", "vn", "ve", "vd", "qw", "qx", "qy", "qz", "wx", "wy", "wz"];
-        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: false, shift_ns })
+        let columns = [T_S, "position_ned_m", "velocity_ned_m_s", "ned_from_body_wxyz", "rate_body_rad_s"];
+        Ok(Self { rows: CsvRows::open::<BodyState>(path, &columns)?, has_ns: false, shift_ns })
     }
 
     /// The sensor is the body.
     pub(super) fn of_sensor(path: &Path, shift_ns: i64) -> Result<Self, DatasetError> {
-        let columns = [
-            "t_true_ns",
-            "true_n_m",
-            "true_e_m",
-            "true_d_m",
-            "true_vn_m_s",
-            "true_ve_m_s",
-            "true_vd_m_s",
-            "true_qw",
-            "true_qx",
-            "true_qy",
-            "true_qz",
-            "true_gyro_x_rad_s",
-            "true_gyro_y_rad_s",
-            "true_gyro_z_rad_s",
-        ];
-        Ok(Self { rows: CsvRows::open(path, &columns)?, has_ns: true, shift_ns })
+        let columns =
+            [T_TRUE_NS, "position_ned_m", "velocity_ned_m_s", "ned_from_sensor_wxyz", "true_gyro_rad_s"];
+        Ok(Self { rows: CsvRows::open::<ImuSample>(path, &columns)?, has_ns: true, shift_ns })
     }
 
     /// The next row; `None` at the end.
@@ -433,9 +418,9 @@ impl PlatformRows {
         Ok(Some(PlatformState {
             t_ns: t_ns.saturating_add(self.shift_ns),
             position_ned_m: rows.vector(1)?,
-            velocity_ned_m_s: rows.vector(4)?,
-            ned_from_body: rows.wxyz(7)?,
-            rate_body_rad_s: rows.vector(11)?,
+            velocity_ned_m_s: rows.vector(2)?,
+            ned_from_body: rows.wxyz(3)?,
+            rate_body_rad_s: rows.vector(4)?,
         }))
     }
 }

@@ -1,12 +1,13 @@
 //! Stamps as names of files, and clocks without times before 0.
 
-use camsim_core::scenario::DatasetFormat;
+use camsim_core::{scenario::DatasetFormat, sensors::ImuSample};
 
 use super::{
     DatasetError, RunFolder,
     csv_rows::CsvRows,
     imu::{descriptions, imus},
 };
+use crate::columns::T_NS;
 
 const SECOND_NS: i64 = 1_000_000_000;
 
@@ -66,7 +67,8 @@ fn first_ns(run: &RunFolder) -> Result<i64, DatasetError> {
         }
     }
     for sensor in descriptions(run)? {
-        let mut rows = CsvRows::open(&sensor.table, &["t_ns"])?;
+        // All sensors have it.
+        let mut rows = CsvRows::open::<ImuSample>(&sensor.table, &[T_NS])?;
         if rows.advance()? {
             first_ns = first_ns.min(rows.whole(0)?);
         }

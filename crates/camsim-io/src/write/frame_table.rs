@@ -7,28 +7,13 @@ use std::{
 
 use camsim_core::{exposure::FrameExposure, geodesy::Geodetic, pose::CameraPose, reference::IdealView};
 
-use super::{WriteError, numbers::push, write_atomic};
-use crate::columns::wxyz;
+use super::{WriteError, write_atomic};
+use crate::columns::{Columns, Part};
 
-/// Columns before those of the paths of a frame's files. The first pose is that of the camera at the stamp.
-/// Columns `ideal_*` describe the pinhole camera whose pixels the source coordinates x, y of `coords` are:
-/// size, focal length, principal point, instant and pose. Both q are ned_from_camera.
-pub const FRAMES_COLUMNS: &str = "\
-    frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
-                                  ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,\
-                                  ideal_qw,ideal_qx,ideal_qy,ideal_qz";
+/// Name of the table.
+pub const FRAMES_CSV: &str = "frames.csv";
 
-/// Columns after these in the table of a flight on Earth: the camera's place at the stamp, in the vertical datum of
-/// the scenario.
-const PLACE_COLUMNS: &str = ",lat_deg,lon_deg,height_m";
-
-/// Columns after those in the table of a camera with automatic exposure.
-const EXPOSURE_COLUMNS: &str = ",exposure_ms,gain";
-
-/// Column after those in the table of a burst.
-const INSTANT_COLUMN: &str = ",instant";
-
-/// One row of `frames.csv`.
+/// One row of `frames.csv`, without the columns of files, which are the last ones.
 #[derive(Clone, Debug)]
 pub struct FrameRecord {
     /// Frame number.
@@ -102,24 +87,24 @@ pub struct TableKind {
 
 impl TableKind {
     /// The columns of values.
-    fn columns(self) -> String {
-        let places = if self.has_places { PLACE_COLUMNS } else { "" };
-        let exposures = if self.has_exposures { EXPOSURE_COLUMNS } else { "" };
-        let instants = if self.has_instants { INSTANT_COLUMN } else { "" };
-        format!("{FRAMES_COLUMNS}{places}{exposures}{instants}")
+    fn columns(self) -> Columns<FrameRecord> {
+        Columns::with(|part| match part {
+            Part::Places => self.has_places,
+            Part::Exposures => self.has_exposures,
+            Part::Instants => self.has_instants,
+            Part::Motion | Part::Poses => false,
+        })
     }
 
     /// The kind of a header, and the columns of files with a comma before each.
     fn of_header(header: &str) -> Option<(Self, &str)> {
-        let mut rest = header.strip_prefix(FRAMES_COLUMNS)?;
-        let optional = [PLACE_COLUMNS, EXPOSURE_COLUMNS, INSTANT_COLUMN];
-        let [has_places, has_exposures, has_instants] = optional.map(|columns| {
-            let after = rest.strip_prefix(columns);
-            let after = after.filter(|after| after.is_empty() || after.starts_with(','));
-            rest = after.unwrap_or(rest);
-            after.is_some()
+        let bits = (0..8).map(|bits: u8| [1, 2, 4].map(|bit| bits & bit > 0));
+        let fits = bits.filter_map(|[has_places, has_exposures, has_instants]| {
+            let kind = Self { has_places, has_exposures, has_instants };
+            let files = header.strip_prefix(&kind.columns().header())?;
+            (files.is_empty() || files.starts_with(',')).then_some((kind, files))
         });
-        Some((Self { has_places, has_exposures, has_instants }, rest))
+        fits.min_by_key(|(_, files)| files.len())
     }
 }
 
@@ -144,7 +129,7 @@ impl FrameTable {
         let mut lines = text.lines();
         let (kind, files) = TableKind::of_header(lines.next()?)?;
         let columns: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
-        let value_columns = kind.columns().split(',').count();
+        let value_columns = kind.columns().header().split(',').count();
         let row = |line: &str| {
             let (end, _) = line.match_indices(',').chain([(line.len(), "")]).nth(value_columns - 1)?;
             let (values, files) = line.split_at(end);
@@ -169,25 +154,8 @@ impl FrameTable {
                 self.columns.push(column.clone());
             }
         }
-        let mut values = format!("{},{}", record.frame, record.stamp_ns);
-        push(&mut values, &record.pose.position_ned_m.to_array());
-        push(&mut values, &wxyz(record.pose.ned_from_camera));
-        let source = &record.source;
-        push(&mut values, &source.size_px.map(f64::from));
-        push(&mut values, &source.focal_px);
-        push(&mut values, &source.principal_px);
-        values += &format!(",{}", source.t_ns);
-        push(&mut values, &source.pose.position_ned_m.to_array());
-        push(&mut values, &wxyz(source.pose.ned_from_camera));
-        if let Some(place) = record.place {
-            push(&mut values, &[place.lat_deg(), place.lon_deg(), place.height_m]);
-        }
-        if let Some(exposure) = record.exposure {
-            push(&mut values, &[1e3 * exposure.time_s, exposure.gain]);
-        }
-        if let Some(instant) = record.instant {
-            values += &format!(",{instant}");
-        }
+        let mut values = String::new();
+        self.kind.columns().push_cells(&mut values, record);
         let row = self.rows.entry((record.frame, record.instant)).or_default();
         row.0 = values;
         row.1.resize(self.columns.len(), String::new());
@@ -240,7 +208,7 @@ impl FrameTable {
     /// The table as CSV.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut text = self.kind.columns();
+        let mut text = self.kind.columns().header();
         let line = |text: &mut String, files: &[String]| {
             for i in 0..self.columns.len() {
                 text.push(',');
@@ -268,7 +236,7 @@ impl FrameTable {
 /// Path of `frames.csv` in an output folder.
 #[must_use]
 pub fn frames_path(folder: &Path) -> PathBuf {
-    folder.join("frames.csv")
+    folder.join(FRAMES_CSV)
 }
 
 /// The first and the last frame that the table of a folder lists; `None` without any.
@@ -306,15 +274,25 @@ mod tests {
         let mut table = FrameTable::default();
         table.insert(&record(4, &["color_exr"]));
         let text = table.to_csv();
-        assert_eq!(
-            text,
-            format!(
-                "{FRAMES_COLUMNS},color_exr\n4,9,1,-2.5,3,1,0,0,0,700,500,420,421.5,349.5,249.25,-7,1,-2.5,3,1,0,\
-                 0,0,color_exr/4\n"
-            )
-        );
+        let header = TableKind::default().columns().header();
+        assert!(text.starts_with(&format!("{header},color_exr\n4,9,1,-2.5,3,1,0,0,0,")), "{text}");
+        for (column, cell) in [
+            ("ideal_width_px", "700"),
+            ("ideal_height_px", "500"),
+            ("ideal_fx_px", "420"),
+            ("ideal_fy_px", "421.5"),
+            ("ideal_cx_px", "349.5"),
+            ("ideal_cy_px", "249.25"),
+            ("ideal_t_ns", "-7"),
+            ("ideal_e", "-2.5"),
+            ("ideal_qw", "1"),
+            ("color_exr", "color_exr/4"),
+        ] {
+            let place = text.lines().next().unwrap().split(',').position(|name| name == column).unwrap();
+            assert_eq!(text.lines().nth(1).unwrap().split(',').nth(place), Some(cell), "{column}");
+        }
         assert_eq!(FrameTable::parse(&text).unwrap(), table);
-        assert_eq!(FrameTable::default().to_csv(), format!("{FRAMES_COLUMNS}\n"));
+        assert_eq!(FrameTable::default().to_csv(), header + "\n");
         // A table of another version.
         assert_eq!(
             FrameTable::parse("frame,stamp_ns,n,e,d,qw,qx,qy,qz,color_exr\n4,9,1,1,1,1,0,0,0,a\n"),
@@ -397,7 +375,8 @@ mod tests {
         let text = table.to_csv();
         let (header, row) = text.trim_end().split_once('\n').unwrap();
         assert!(header.ends_with(",ideal_qz,lat_deg,lon_deg,height_m,color_png"), "{header}");
-        let place: Vec<f64> = row.split(',').skip(23).take(3).map(|value| value.parse().unwrap()).collect();
+        let at = header.split(',').position(|name| name == "lat_deg").unwrap();
+        let place: Vec<f64> = row.split(',').skip(at).take(3).map(|value| value.parse().unwrap()).collect();
         assert!(
             (place[0] - 47.5).abs() < 1e-12 && (place[1] + 8.25).abs() < 1e-12 && place[2] == 430.0,
             "{row}"

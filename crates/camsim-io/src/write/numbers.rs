@@ -21,12 +21,10 @@ impl fmt::Display for Number {
     }
 }
 
-/// Appends numbers, each with a comma before it.
-pub(super) fn push(line: &mut String, values: &[f64]) {
-    for value in values {
-        line.push(',');
-        line.push_str(Number(*value).digits(&mut zmij::Buffer::new()));
-    }
+/// Nanoseconds as decimal seconds, exactly: with all nine decimals.
+pub(crate) fn seconds(t_ns: i64) -> String {
+    let (whole, rest) = (t_ns.unsigned_abs() / 1_000_000_000, t_ns.unsigned_abs() % 1_000_000_000);
+    format!("{}{whole}.{rest:09}", if t_ns < 0 { "-" } else { "" })
 }
 
 #[cfg(test)]
@@ -56,6 +54,11 @@ mod tests {
             assert_eq!(Number(value).to_string(), text);
             assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
         }
+    }
+
+    #[test]
+    fn seconds_have_nine_decimals() {
+        assert_eq!([seconds(-1), seconds(1_000_000_123)], ["-0.000000001", "1.000000123"]);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use camsim_core::sensors::{
 };
 
 use super::{WriteError, atomic::write_atomic_with, write_atomic};
-use crate::columns::{TableRow, header, push_line};
+use crate::columns::{Columns, TableRow};
 
 mod description;
 mod kalibr;
@@ -94,14 +94,15 @@ fn write_table<R: TableRow>(
 ) -> Result<Counts, WriteError> {
     let mut counts = Counts::default();
     let mut samples = Some(samples);
+    let columns = Columns::all();
     write_atomic_with(path, &mut |out| {
-        writeln!(out, "{}", header(R::COLUMNS))?;
+        writeln!(out, "{}", columns.header())?;
         let mut line = String::new();
         for sample in samples.take().into_iter().flatten() {
             let (time, is_flagged) = mark(&sample);
             counts.add(&time, is_flagged, input);
             line.clear();
-            push_line(&mut line, R::COLUMNS, &sample);
+            columns.push_line(&mut line, &sample);
             out.write_all(line.as_bytes())?;
         }
         Ok(())
@@ -126,11 +127,11 @@ fn refuse_foreign(folder: &Path, name: &str) -> Result<(), WriteError> {
     let table = folder.join(format!("{name}.csv"));
     let description = description_path(folder, name);
     let known = [
-        header(ImuSample::COLUMNS),
-        header(&ImuSample::COLUMNS[..ImuSample::COLUMNS.len() - 1]),
-        header(GnssSample::COLUMNS),
-        header(BarometerSample::COLUMNS),
-        header(MagnetometerSample::COLUMNS),
+        Columns::<ImuSample>::all().header(),
+        Columns::<ImuSample>::all().header().replace(",is_saturated", ""),
+        Columns::<GnssSample>::all().header(),
+        Columns::<BarometerSample>::all().header(),
+        Columns::<MagnetometerSample>::all().header(),
     ];
     let has_our_columns = |file: File| {
         let mut line = String::new();

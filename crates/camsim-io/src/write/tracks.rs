@@ -6,7 +6,6 @@
 
 use std::{
     collections::BTreeSet,
-    fmt::Write as _,
     fs::{self, File},
     io::{self, BufRead, BufReader, Read, Write as _},
     path::{Path, PathBuf},
@@ -14,56 +13,59 @@ use std::{
 
 use camsim_core::tracks::{Sighting, TrackPoint};
 
-use super::{Number, WriteError, atomic::write_atomic_with, numbers::push, write_atomic};
+use super::{WriteError, atomic::write_atomic_with, write_atomic};
+use crate::columns::{Columns, Part};
 
-/// Columns of `tracks.csv`: pixel coordinates (0, 0 is the centre of the first pixel), instant of the row at
-/// the point on the clock of stamps, planar depth at that instant, 1 if nothing is in front of the point, and
-/// number of positions at which this frame shows the point.
-pub const TRACKS_COLUMNS: &str = "frame,point,x_px,y_px,t_ns,depth_m,visible,solutions";
-/// Columns of `points.csv`; [`GEODETIC_COLUMNS`] follow where the place of the local frame is known.
-pub const POINTS_COLUMNS: &str = "point,name,source,n_m,e_m,d_m";
-/// Further column of `points.csv` where anything moves: 1 for a point on it, which is there at path time 0.
-pub const MOVES_COLUMN: &str = ",moves";
-/// Further columns of `points.csv`. Heights are above what those of the flight log are above.
-pub const GEODETIC_COLUMNS: &str = ",lat_deg,lon_deg,height_m";
+/// Name of the table of points.
+pub const POINTS_CSV: &str = "points.csv";
+/// Name of the table of where frames show them.
+pub const TRACKS_CSV: &str = "tracks.csv";
+
+/// A line of `points.csv`.
+#[derive(Clone, Debug)]
+pub(crate) struct PointRecord {
+    pub(crate) number: u32,
+    pub(crate) point: TrackPoint,
+    /// Latitude, longitude, and height as those of the flight log.
+    pub(crate) place: Option<[f64; 3]>,
+}
+
+/// A line of `tracks.csv`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TrackRecord {
+    pub(crate) frame: u64,
+    pub(crate) t_ns: i64,
+    pub(crate) sighting: Sighting,
+}
 
 /// Text of `points.csv`.
 pub fn points_csv(points: &[TrackPoint], geodetic: &dyn Fn(&TrackPoint) -> Option<[f64; 3]>) -> String {
     let has_places = points.first().is_some_and(|point| geodetic(point).is_some());
     let has_motion = points.iter().any(|point| point.moves_with.is_some());
-    let mut text = POINTS_COLUMNS.to_owned();
-    text += if has_motion { MOVES_COLUMN } else { "" };
-    text += if has_places { GEODETIC_COLUMNS } else { "" };
-    text.push('\n');
-    for (i, point) in points.iter().enumerate() {
-        let _ = write!(text, "{i},{},{}", quoted(&point.name), quoted(&point.source));
-        push(&mut text, &point.position_ned_m.to_array());
-        if has_motion {
-            text += if point.moves_with.is_some() { ",1" } else { ",0" };
-        }
-        push(&mut text, geodetic(point).as_ref().map_or(&[], |place| place));
-        text.push('\n');
-    }
-    text
+    let columns = Columns::with(|part| match part {
+        Part::Motion => has_motion,
+        Part::Places => has_places,
+        _ => false,
+    });
+    let record = |(number, point): (u32, &TrackPoint)| PointRecord {
+        number,
+        point: point.clone(),
+        place: geodetic(point),
+    };
+    columns.csv((0..).zip(points).map(record))
 }
 
-/// A cell of a CSV file.
-fn quoted(text: &str) -> String {
-    if text.contains(['"', ',', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+fn tracks_header() -> String {
+    Columns::<TrackRecord>::all().header()
 }
 
 /// Rows of one frame in `tracks.csv`; `epoch_ns` is the stamp at path time 0.
 pub fn tracks_rows(frame: u64, epoch_ns: i64, sightings: &[Sighting]) -> String {
+    let columns = Columns::all();
     let mut text = String::with_capacity(96 * sightings.len());
-    for Sighting { point, seen, is_visible } in sightings {
-        let t_ns = epoch_ns.saturating_add((seen.t_s * 1e9).round() as i64);
-        let [x, y, depth_m] = [seen.px.x, seen.px.y, seen.depth_m].map(Number);
-        let (visible, solutions) = (u8::from(*is_visible), seen.solutions);
-        let _ = writeln!(text, "{frame},{point},{x},{y},{t_ns},{depth_m},{visible},{solutions}");
+    for &sighting in sightings {
+        let t_ns = epoch_ns.saturating_add((sighting.seen.t_s * 1e9).round() as i64);
+        columns.push_line(&mut text, &TrackRecord { frame, t_ns, sighting });
     }
     text
 }
@@ -82,11 +84,11 @@ impl TrackFiles {
     }
 
     fn points(&self) -> PathBuf {
-        self.folder.join("points.csv")
+        self.folder.join(POINTS_CSV)
     }
 
     fn tracks(&self) -> PathBuf {
-        self.folder.join("tracks.csv")
+        self.folder.join(TRACKS_CSV)
     }
 
     /// Hidden, and without the names of frame files: the rows of frames that are not merged yet.
@@ -103,7 +105,8 @@ impl TrackFiles {
     /// # Errors
     /// A file that cannot be read.
     pub fn foreign(&self) -> Result<Option<PathBuf>, WriteError> {
-        for (path, columns) in [(self.points(), POINTS_COLUMNS), (self.tracks(), TRACKS_COLUMNS)] {
+        let points = Columns::<PointRecord>::with(|_| false).header();
+        for (path, columns) in [(self.points(), points), (self.tracks(), tracks_header())] {
             let mut begin = vec![0; columns.len()];
             let read = match File::open(&path) {
                 Ok(mut file) => file.read_exact(&mut begin),
@@ -167,7 +170,7 @@ impl TrackFiles {
         let mut old = OldRows::open(&path);
         let mut failed = None;
         let written = write_atomic_with(&path, &mut |out| {
-            writeln!(out, "{TRACKS_COLUMNS}")?;
+            writeln!(out, "{}", tracks_header())?;
             for &frame in frames {
                 if let Ok(mut part) = File::open(self.part(frame)) {
                     io::copy(&mut part, out)?;
@@ -219,7 +222,7 @@ impl OldRows {
         let mut old = Self { reader: File::open(path).ok().map(BufReader::new), next: None };
         let mut header = String::new();
         let is_read = old.reader.as_mut().is_some_and(|reader| reader.read_line(&mut header).is_ok());
-        if !is_read || header.trim_end() != TRACKS_COLUMNS {
+        if !is_read || header.trim_end() != tracks_header() {
             old.reader = None;
         }
         old
@@ -290,19 +293,16 @@ mod tests {
         };
         assert_eq!(
             points_csv(std::slice::from_ref(&point), &|_| Some([46.5, 7.25, 900.0])),
-            format!(
-                "{POINTS_COLUMNS}{GEODETIC_COLUMNS}\n0,\"the \"\"top\"\", left\",a.csv,1,-2.5,3,46.5,7.25,900\n"
-            )
+            "point,name,source,n_m,e_m,d_m,lat_deg,lon_deg,height_m\n\
+             0,\"the \"\"top\"\", left\",a.csv,1,-2.5,3,46.5,7.25,900\n"
         );
         let on_a_car = TrackPoint { moves_with: Some(2), name: "car/0".into(), ..point.clone() };
         assert_eq!(
             points_csv(&[point, on_a_car], &|_| None),
-            format!(
-                "{POINTS_COLUMNS}{MOVES_COLUMN}\n0,\"the \"\"top\"\", left\",a.csv,1,-2.5,3,0\n\
-                 1,car/0,a.csv,1,-2.5,3,1\n"
-            )
+            "point,name,source,n_m,e_m,d_m,moves\n0,\"the \"\"top\"\", left\",a.csv,1,-2.5,3,0\n\
+             1,car/0,a.csv,1,-2.5,3,1\n"
         );
-        assert_eq!(points_csv(&[], &|_| None), format!("{POINTS_COLUMNS}\n"));
+        assert_eq!(points_csv(&[], &|_| None), "point,name,source,n_m,e_m,d_m\n");
     }
 
     /// Merges; returns the table and the frames that were asked for.
@@ -321,7 +321,7 @@ mod tests {
     fn runs_add_to_one_table_in_the_order_of_frames() {
         let folder = tempfile::tempdir().unwrap();
         let files = TrackFiles::new(folder.path());
-        let table = |rows: &str| format!("{TRACKS_COLUMNS}\n{rows}");
+        let table = |rows: &str| tracks_header() + "\n" + rows;
         files.begin("point,name,source,n_m,e_m,d_m\n").unwrap();
         for frame in [4, 0, 2] {
             files.write_part(frame, &format!("{frame},0\n{frame},1\n")).unwrap();

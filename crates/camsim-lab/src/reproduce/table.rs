@@ -1,5 +1,7 @@
 //! Tables as text, Markdown and CSV.
 
+use camsim_io::columns::csv_cell;
+
 /// Rows of text under named columns.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
@@ -71,17 +73,12 @@ impl Table {
         text
     }
 
-    /// The table as CSV with a header; cells with commas or quotes are quoted.
+    /// The table as CSV with a header.
     #[must_use]
     pub fn csv(&self) -> String {
-        let cell = |cell: &String| {
-            if cell.contains([',', '"', '\n']) {
-                format!("\"{}\"", cell.replace('"', "\"\""))
-            } else {
-                cell.clone()
-            }
+        let line = |cells: &Vec<String>| {
+            cells.iter().map(|cell| csv_cell(cell)).collect::<Vec<_>>().join(",") + "\n"
         };
-        let line = |cells: &Vec<String>| cells.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
         std::iter::once(&self.columns).chain(&self.rows).map(line).collect()
     }
 }

@@ -14,7 +14,7 @@ use camsim_io::{
     inputs,
     manifest::{PATHS, check_resume_key, portable_inputs},
     portable::{relative_to, write_camera},
-    write::{FrameFiles, FrameWriter, write_atomic},
+    write::{FrameFiles, FrameWriter, frames_path, write_atomic},
 };
 use serde::Serialize;
 
@@ -314,7 +314,7 @@ fn write_table(args: &ApplyArgs, set: &FrameSet, files: &FrameFiles) -> Result<(
     let there: Vec<u64> = (0..set.entries().len() as u64)
         .filter(|&index| files.exist(args.frame_number.saturating_add(index)))
         .collect();
-    write_atomic(&args.output.join("frames.csv"), &frames_csv(args, set, files, &there)?).or_failed()
+    write_atomic(&frames_path(&args.output), &frames_csv(args, set, files, &there)?).or_failed()
 }
 
 /// Columns `frame,stamp_ns,from_color,from_depth`, then the files of each frame; empty if there is none.

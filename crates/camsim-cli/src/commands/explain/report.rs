@@ -9,7 +9,7 @@ use camsim_core::{
     tracker::{ResolvedLimits, Saturation},
 };
 use camsim_engine::Engine;
-use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
+use camsim_io::{columns::wxyz, load::Loaded, terrain::TerrainSummary, write::SourceFrame};
 use camsim_plan::{FramePlan, LevelOfDetail, Placement, PlanSummary, Planner};
 use serde::Serialize;
 
@@ -122,7 +122,6 @@ pub(super) struct SourceFrameFields {
 impl SourceFrameFields {
     fn of(frame: &SourceFrame) -> Self {
         let SourceFrame { size_px, focal_px, principal_px, t_ns, pose } = *frame;
-        let q = pose.ned_from_camera;
         Self {
             ideal_width_px: size_px[0],
             ideal_height_px: size_px[1],
@@ -132,7 +131,7 @@ impl SourceFrameFields {
             ideal_cy_px: principal_px[1],
             ideal_t_ns: t_ns,
             ideal_ned_m: pose.position_ned_m.to_array(),
-            ideal_q_wxyz: [q.w, q.x, q.y, q.z],
+            ideal_q_wxyz: wxyz(pose.ned_from_camera),
         }
     }
 }

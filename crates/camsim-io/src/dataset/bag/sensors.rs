@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use camsim_core::sensors::GnssSample;
+
 use super::{
     super::{
         DatasetError, ExportJob, RunFolder,
@@ -13,6 +15,7 @@ use super::{
     Bag, Source,
     messages::{Header, Imu, NavSatFix, Pose, PoseStamped, StampedTransform, TransformMessage},
 };
+use crate::columns::T_NS;
 
 /// Motion of `base_link`.
 pub(super) struct TruePoses {
@@ -119,7 +122,8 @@ pub(super) struct Fixes {
 
 impl Fixes {
     pub(super) fn new(i: usize, table: &std::path::Path, shift_ns: i64) -> Result<Self, DatasetError> {
-        let rows = CsvRows::open(table, &["t_ns", "fix", "lat_deg", "lon_deg", "height_m"])?;
+        let columns = [T_NS, "has_fix", "lat_deg", "lon_deg", "height_m"];
+        let rows = CsvRows::open::<GnssSample>(table, &columns)?;
         let mut fixes = Self { name: format!("gnss{i}"), rows, shift_ns, next_ns: None };
         fixes.advance()?;
         Ok(fixes)

@@ -12,7 +12,7 @@ use super::{
     picture,
     rigs::{ModelRig, Moment, moments, rig_from_world, rigs},
 };
-use crate::calibration::colmap::camera_model;
+use crate::{calibration::colmap::camera_model, write::POINTS_CSV};
 
 /// Most observations that are held at once to write points with their tracks.
 const HELD: u64 = 4_000_000;
@@ -95,7 +95,7 @@ impl<'a> Model<'a> {
         for (i, camera) in job.run.cameras.iter().enumerate() {
             let calibration = camera.calibration()?;
             let (name, number, parameters) = camera_model(&calibration)?;
-            let own = read_points(&camera.folder.join("points.csv"))?;
+            let own = read_points(&camera.folder.join(POINTS_CSV))?;
             // Cameras of a rig that track the same points share them.
             let first_point = match tables.iter().find(|(points, _)| *points == own) {
                 Some((_, first)) => *first,

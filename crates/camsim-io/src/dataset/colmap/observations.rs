@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::super::{DatasetError, csv_rows::CsvRows, run_folder::RunCamera};
+use crate::write::{PointRecord, TRACKS_CSV, TrackRecord};
 
 /// Where a frame shows a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,11 +25,12 @@ pub(super) struct FrameObservations {
 impl FrameObservations {
     /// Opens the table of a camera; without rows if it has none.
     pub(super) fn open(camera: &RunCamera) -> Result<Self, DatasetError> {
-        let path = camera.folder.join("tracks.csv");
+        let path = camera.folder.join(TRACKS_CSV);
         if !path.is_file() {
             return Ok(Self { rows: None, next: None });
         }
-        let rows = CsvRows::open(&path, &["frame", "point", "x_px", "y_px", "visible", "solutions"])?;
+        let columns = ["frame", "point", "x_px", "y_px", "visible", "solutions"];
+        let rows = CsvRows::open::<TrackRecord>(&path, &columns)?;
         let mut observations = Self { rows: Some(rows), next: None };
         observations.advance()?;
         Ok(observations)
@@ -65,7 +67,7 @@ impl FrameObservations {
 pub(super) fn read_points(path: &Path) -> Result<Vec<DVec3>, DatasetError> {
     let mut points = Vec::new();
     if path.is_file() {
-        let mut rows = CsvRows::open(path, &["n_m", "e_m", "d_m"])?;
+        let mut rows = CsvRows::open::<PointRecord>(path, &["position_ned_m"])?;
         while rows.advance()? {
             points.push(rows.vector(0)?);
         }

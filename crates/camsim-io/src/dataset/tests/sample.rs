@@ -15,10 +15,11 @@ use glam::{DQuat, DVec3};
 use tempfile::TempDir;
 
 use crate::{
+    columns::Columns,
     manifest::{PATHS, RunManifest},
     scenario_file::parse_scenario,
     write::{
-        FrameFiles, FrameRecord, FrameTable, FrameWriter, SourceFrame, Stamped, TRACKS_COLUMNS, frames_path,
+        FrameFiles, FrameRecord, FrameTable, FrameWriter, SourceFrame, Stamped, TrackRecord, frames_path,
         trajectory_csv, write_atomic,
     },
 };
@@ -165,7 +166,7 @@ impl Sample {
             let _ = writeln!(text, "{i},p{i},table.csv,{n},{e},{d}");
         }
         write_atomic(&self.run().join("points.csv"), text.as_bytes()).unwrap();
-        let mut text = format!("{TRACKS_COLUMNS}\n");
+        let mut text = format!("{}\n", Columns::<TrackRecord>::all().header());
         for (frame, point, [x, y], visible, solutions) in rows {
             let _ = writeln!(text, "{frame},{point},{x},{y},{},7.5,{visible},{solutions}", stamp_ns(*frame));
         }
