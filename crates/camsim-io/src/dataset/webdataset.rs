@@ -1,24 +1,21 @@
 //! WebDataset: tar shards of samples, an index of shards (`index.json`) and one of samples (`samples.csv`,
 //! `samples.parquet`).
 
-use std::{
-    fs::File,
-    io::{BufWriter, Write},
-    path::PathBuf,
-};
+use std::{fs::File, io::BufWriter, path::PathBuf};
 
 use super::{
     DatasetError, ExportJob,
-    axes::enu_from_camera,
+    axes::{Rigid, enu_from_camera},
     page::{OPTICAL, PIXEL_CENTRE_0, Page, WORLD, timing},
     run_folder::{RunCamera, RunFrame},
-    text::wxyz,
+    text::{upright, wxyz},
 };
-use crate::write::WriteError;
+use crate::{
+    columns::{Column, Columns, Get, Part, TableRow, column, of, plain},
+    write::WriteError,
+};
 
 mod parquet_index;
-
-use parquet_index::SampleRow;
 
 /// Samples of a shard.
 const SHARD: usize = 500;
@@ -54,7 +51,6 @@ pub(super) fn write(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
     }
     write_index(job, &shards)?;
     write_samples(job, &shards)?;
-    write_parquet(job, &shards)?;
     job.target.text("README.md", &page(job))?;
     Ok(Vec::new())
 }
@@ -166,37 +162,58 @@ fn write_index(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> R
     job.target.text("index.json", &(format!("{index:#}") + "\n"))
 }
 
-fn write_samples(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> Result<(), DatasetError> {
-    job.target.stream("samples.csv", &mut |out| {
-        writeln!(out, "key,shard,frame,camera,stamp_ns,centre_ns")?;
-        for (k, shard) in shards.iter().enumerate() {
-            for (series, frame) in *shard {
-                let (camera, centre_ns) = (&series.camera.name, series.camera.true_centre_ns(frame));
-                let (key, shard, number) = (key(series, frame), shard_name(k), frame.number);
-                writeln!(out, "{key},{shard},{number},{camera},{},{centre_ns}", frame.stamp_ns)?;
-            }
-        }
-        Ok(())
-    })
+/// A row of the index of samples.
+struct SampleRow {
+    key: String,
+    shard: String,
+    frame: u64,
+    camera: String,
+    stamp_ns: i64,
+    centre_ns: i64,
+    /// Of the camera in east, north, up.
+    pose: Rigid,
 }
 
-/// The same index for readers of columns, with the poses.
-fn write_parquet(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> Result<(), DatasetError> {
+impl TableRow for SampleRow {
+    const COLUMNS: &'static [Column<Self>] = &[
+        plain("key", "name of the sample's files without ending", Get::Text(|row| &row.key)),
+        plain("shard", "its shard", Get::Text(|row| &row.shard)),
+        plain("frame", "number of its frame", Get::Whole(|row| row.frame as i64)),
+        plain("camera", "its camera", Get::Text(|row| &row.camera)),
+        plain("stamp_ns", "its stamp", Get::Whole(|row| row.stamp_ns)),
+        plain("centre_ns", "when the image's centre was exposed", Get::Whole(|row| row.centre_ns)),
+        of(
+            Part::Poses,
+            column("position_enu_m", "*_m", "of the camera then", Get::Xyz(|row| row.pose.translation_m)),
+        ),
+        of(
+            Part::Poses,
+            column("enu_from_camera_wxyz", "q*", "its attitude", Get::Wxyz(|row| row.pose.rotation)),
+        ),
+    ];
+}
+
+/// Writes the index of samples, for readers of columns with the poses.
+fn write_samples(job: &ExportJob<'_>, shards: &[&[(&Series<'_>, &RunFrame)]]) -> Result<(), DatasetError> {
+    let row = |k: usize, series: &Series<'_>, frame: &RunFrame, pose: Rigid| SampleRow {
+        key: key(series, frame),
+        shard: shard_name(k),
+        frame: frame.number,
+        camera: series.camera.name.clone(),
+        stamp_ns: frame.stamp_ns,
+        centre_ns: series.camera.true_centre_ns(frame),
+        pose,
+    };
     let samples = || shards.iter().enumerate().flat_map(|(k, shard)| shard.iter().map(move |one| (k, one)));
+    let without_poses = samples().map(|(k, (series, frame))| row(k, series, frame, Rigid::IDENTITY));
+    let csv = Columns::with(|part| part != Part::Poses).csv(without_poses);
+    job.target.text("samples.csv", &csv)?;
     job.target.stream("samples.parquet", &mut |out| {
-        let row = |(k, (series, frame)): (usize, &(&Series<'_>, &RunFrame))| {
-            let camera = series.camera;
-            let pose = enu_from_camera(&camera.centre_pose(job.name(), frame)?);
-            let ([x, y, z], [qw, qx, qy, qz]) = (pose.translation_m.to_array(), wxyz(pose.rotation));
-            Ok(SampleRow {
-                key: key(series, frame),
-                shard: shard_name(k),
-                camera: camera.name.clone(),
-                numbers: [frame.number as i64, frame.stamp_ns, camera.true_centre_ns(frame)],
-                pose: [x, y, z, qw, qx, qy, qz],
-            })
+        let with_pose = |(k, (series, frame)): (usize, &(&Series<'_>, &RunFrame))| {
+            let pose = enu_from_camera(&series.camera.centre_pose(job.name(), frame)?);
+            Ok(row(k, series, frame, Rigid { rotation: upright(pose.rotation), ..pose }))
         };
-        parquet_index::write(out, samples().map(row))
+        parquet_index::write(out, samples().map(with_pose))
     })
 }
 

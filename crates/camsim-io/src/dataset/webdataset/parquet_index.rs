@@ -3,7 +3,8 @@
 use std::{fs::File, io::BufWriter, sync::Arc};
 
 use parquet::{
-    data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type},
+    column::writer::ColumnWriter,
+    data_type::ByteArray,
     errors::ParquetError,
     file::{
         properties::WriterProperties,
@@ -13,43 +14,17 @@ use parquet::{
 };
 
 use super::super::DatasetError;
+use crate::columns::{Cell, Columns, Get, TableRow};
 
 /// Samples of a group of rows: what is held in memory.
 const GROUP: usize = 2000;
 
-const SCHEMA: &str = "message samples {
-    required binary key (STRING);
-    required binary shard (STRING);
-    required int64 frame;
-    required binary camera (STRING);
-    required int64 stamp_ns;
-    required int64 centre_ns;
-    required double x_m;
-    required double y_m;
-    required double z_m;
-    required double qw;
-    required double qx;
-    required double qy;
-    required double qz;
-}";
-
-/// A row of the index.
-pub(super) struct SampleRow {
-    pub(super) key: String,
-    pub(super) shard: String,
-    pub(super) camera: String,
-    /// Frame, stamp, instant of the centre.
-    pub(super) numbers: [i64; 3],
-    /// Position and quaternion w x y z.
-    pub(super) pose: [f64; 7],
-}
-
 /// Writes the rows.
-pub(super) fn write(
+pub(super) fn write<R: TableRow>(
     out: &mut BufWriter<File>,
-    rows: impl Iterator<Item = Result<SampleRow, DatasetError>>,
+    rows: impl Iterator<Item = Result<R, DatasetError>>,
 ) -> Result<(), DatasetError> {
-    let schema = parse_message_type(SCHEMA).map_err(piece)?;
+    let schema = parse_message_type(&schema::<R>()).map_err(piece)?;
     let properties = Arc::new(WriterProperties::builder().build());
     let mut file = SerializedFileWriter::new(out, Arc::new(schema), properties).map_err(piece)?;
     let mut group = Vec::with_capacity(GROUP);
@@ -78,28 +53,48 @@ fn piece(error: ParquetError) -> DatasetError {
     })
 }
 
-/// Columns in the order of the schema.
-fn write_group<W: std::io::Write + Send>(
-    columns: &mut SerializedRowGroupWriter<'_, W>,
-    rows: &[SampleRow],
-) -> Result<(), ParquetError> {
-    let texts = |text: fn(&SampleRow) -> &str| rows.iter().map(|row| ByteArray::from(text(row))).collect();
-    let numbers = |k: usize| rows.iter().map(|row| row.numbers[k]).collect();
-    column::<ByteArrayType, W>(columns, texts(|row| &row.key))?;
-    column::<ByteArrayType, W>(columns, texts(|row| &row.shard))?;
-    column::<Int64Type, W>(columns, numbers(0))?;
-    column::<ByteArrayType, W>(columns, texts(|row| &row.camera))?;
-    column::<Int64Type, W>(columns, numbers(1))?;
-    column::<Int64Type, W>(columns, numbers(2))?;
-    (0..7).try_for_each(|k| column::<DoubleType, W>(columns, rows.iter().map(|row| row.pose[k]).collect()))
+/// Columns of these names and types.
+fn schema<R: TableRow>() -> String {
+    let mut text = "message samples {\n".to_owned();
+    for column in R::COLUMNS {
+        let (kind, note) = match column.get {
+            Get::Text(_) => ("binary", " (STRING)"),
+            Get::Index(_) | Get::Whole(_) | Get::Flag(_) => ("int64", ""),
+            _ => ("double", ""),
+        };
+        column.names().for_each(|name| text += &format!("required {kind} {name}{note};\n"));
+    }
+    text + "}"
 }
 
-fn column<T: DataType, W: std::io::Write + Send>(
+/// Columns in the order of the schema.
+fn write_group<R: TableRow, W: std::io::Write + Send>(
     columns: &mut SerializedRowGroupWriter<'_, W>,
-    values: Vec<T::T>,
+    rows: &[R],
 ) -> Result<(), ParquetError> {
-    if let Some(mut column) = columns.next_column()? {
-        column.typed::<T>().write_batch(&values, None, None)?;
+    let all = Columns::<R>::all();
+    for k in 0..all.names().count() {
+        let (mut texts, mut wholes, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
+        for row in rows {
+            let mut place = 0;
+            all.each_cell(row, &mut |cell| {
+                match cell {
+                    _ if place != k => {}
+                    Cell::Text(value) => texts.push(ByteArray::from(value)),
+                    Cell::Whole(value) => wholes.push(value),
+                    Cell::Number(value) => numbers.push(value),
+                    Cell::Empty => numbers.push(f64::NAN),
+                }
+                place += 1;
+            });
+        }
+        let Some(mut column) = columns.next_column()? else { break };
+        match column.untyped() {
+            ColumnWriter::ByteArrayColumnWriter(column) => column.write_batch(&texts, None, None)?,
+            ColumnWriter::Int64ColumnWriter(column) => column.write_batch(&wholes, None, None)?,
+            ColumnWriter::DoubleColumnWriter(column) => column.write_batch(&numbers, None, None)?,
+            _ => 0,
+        };
         column.close()?;
     }
     Ok(())
