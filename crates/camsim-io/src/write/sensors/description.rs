@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::{
     scenario::{BarometerSpec, GnssSpec, ImuSpec, MagnetometerSpec},
-    sensors::{SensorInput, SensorMount, Sensors},
+    sensors::{GnssSample, ImuSample, SensorInput, SensorMount, Sensors},
 };
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -80,58 +80,32 @@ pub(crate) struct SensorFile<S> {
 impl<'a> Description<'a> {
     /// The descriptions of all sensors.
     pub(super) fn of_all(sensors: &'a Sensors) -> Vec<Self> {
-        let imus = sensors.imus.iter().map(|imu| Self {
-            name: &imu.spec.name,
-            kind: "imu",
-            rate_hz: imu.clock.rate_hz(),
-            mount: imu.mount,
-            input: imu.input(),
+        macro_rules! described {
+            ($list:ident, $kind:literal, $spec:ident, $is_flagged:expr) => {
+                sensors.$list.iter().map(|one| Self {
+                    name: &one.spec.name,
+                    kind: $kind,
+                    rate_hz: one.clock.rate_hz(),
+                    mount: one.mount,
+                    input: one.input(),
+                    matrices: None,
+                    noise: None,
+                    spec: Spec::$spec(&one.spec),
+                    write_table: Box::new(move |path| {
+                        write_table(path, one.input(), one.samples(), |row| (row.time, $is_flagged(row)))
+                    }),
+                })
+            };
+        }
+        let imus = described!(imus, "imu", Imu, |row: &ImuSample| row.is_saturated);
+        let imus = sensors.imus.iter().zip(imus).map(|(imu, description)| Self {
             matrices: Some(imu.matrices()),
             noise: Some(KalibrFigures::new(&imu.spec)),
-            spec: Spec::Imu(&imu.spec),
-            write_table: Box::new(move |path| {
-                write_table(path, imu.input(), imu.samples(), |row| (row.time, row.is_saturated))
-            }),
+            ..description
         });
-        let gnss = sensors.gnss.iter().map(|gnss| Self {
-            name: &gnss.spec.name,
-            kind: "gnss",
-            rate_hz: gnss.clock.rate_hz(),
-            mount: gnss.mount,
-            input: gnss.input(),
-            matrices: None,
-            noise: None,
-            spec: Spec::Gnss(&gnss.spec),
-            write_table: Box::new(move |path| {
-                write_table(path, gnss.input(), gnss.samples(), |row| (row.time, row.fix.is_none()))
-            }),
-        });
-        let barometers = sensors.barometers.iter().map(|air| Self {
-            name: &air.spec.name,
-            kind: "barometer",
-            rate_hz: air.clock.rate_hz(),
-            mount: air.mount,
-            input: air.input(),
-            matrices: None,
-            noise: None,
-            spec: Spec::Barometer(&air.spec),
-            write_table: Box::new(move |path| {
-                write_table(path, air.input(), air.samples(), |row| (row.time, false))
-            }),
-        });
-        let magnetometers = sensors.magnetometers.iter().map(|field| Self {
-            name: &field.spec.name,
-            kind: "magnetometer",
-            rate_hz: field.clock.rate_hz(),
-            mount: field.mount,
-            input: field.input(),
-            matrices: None,
-            noise: None,
-            spec: Spec::Magnetometer(&field.spec),
-            write_table: Box::new(move |path| {
-                write_table(path, field.input(), field.samples(), |row| (row.time, false))
-            }),
-        });
+        let gnss = described!(gnss, "gnss", Gnss, |row: &GnssSample| row.fix.is_none());
+        let barometers = described!(barometers, "barometer", Barometer, |_| false);
+        let magnetometers = described!(magnetometers, "magnetometer", Magnetometer, |_| false);
         imus.chain(gnss).chain(barometers).chain(magnetometers).collect()
     }
 
