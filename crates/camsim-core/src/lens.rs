@@ -10,7 +10,7 @@
 //! [`Lens::ray`], [`Lens::contains_ray`]).
 //!
 //! A new model needs one file here with its facts and formula (of the radius, [`radial`], or of the ray,
-//! [`direction`]), a variant of [`LensModel`] and its line in [`facts`].
+//! [`direction`]), its two lines below, and a variant of [`LensModel`].
 
 use std::sync::Arc;
 
@@ -25,6 +25,7 @@ mod brown_conrady;
 mod brown_conrady_prism;
 mod bulk;
 mod circle;
+mod class;
 mod direction;
 mod division;
 mod double_sphere;
@@ -63,9 +64,34 @@ pub use scaled::ScaledLens;
 pub(crate) use scaled::largest_radius;
 pub use table::{GridOf, LensGrid, LensGridError, RayChart};
 
+use class::LensClass;
 use facts::Shape;
 pub(crate) use fold::MAX_FIELD_RAD;
 use scaled::RadialScale;
+
+impl ModelFacts {
+    /// What is known of a model.
+    #[must_use]
+    pub const fn of(model: LensModel) -> &'static Self {
+        match model {
+            LensModel::Pinhole => &pinhole::FACTS,
+            LensModel::BrownConrady => &brown_conrady::FACTS,
+            LensModel::KannalaBrandt => &kannala_brandt::FACTS,
+            LensModel::BrownConradyPrism => &brown_conrady_prism::FACTS,
+            LensModel::Fisheye624 => &fisheye624::FACTS,
+            LensModel::FTheta => &f_theta::FACTS,
+            LensModel::FThetaInverse => &f_theta::INVERSE_FACTS,
+            LensModel::DoubleSphere => &double_sphere::FACTS,
+            LensModel::Eucm => &eucm::FACTS,
+            LensModel::Ucm => &ucm::FACTS,
+            LensModel::Mei => &mei::FACTS,
+            LensModel::Division => &division::FACTS,
+            LensModel::Fov => &fov::FACTS,
+            LensModel::Equirectangular => &equirectangular::FACTS,
+            LensModel::Table => &table::FACTS,
+        }
+    }
+}
 
 /// Default distorted radius covered by the start table of [`Lens::new`], in units of the focal length; see
 /// [`Lens::with_reach`].
@@ -131,6 +157,21 @@ pub enum Lens {
     Circle(Box<CircleLens>),
 }
 
+/// What a lens does by its class.
+macro_rules! of_class {
+    ($lens:expr, $class:ident => $value:expr) => {
+        match $lens {
+            Lens::Pinhole($class) => $value,
+            Lens::BrownConrady($class) => $value,
+            Lens::Radial($class) => $value,
+            Lens::Direction($class) => $value,
+            Lens::Face($class) => $value,
+            Lens::Scaled($class) => $value,
+            Lens::Circle($class) => $value,
+        }
+    };
+}
+
 impl Lens {
     /// A lens from its model and coefficients in the order of [`ModelFacts::of`]; trailing ones may be left
     /// out.
@@ -150,7 +191,7 @@ impl Lens {
         }
         let facts = ModelFacts::of(model);
         let all = facts.complete(coefficients).ok_or_else(|| LensError::TooManyCoefficients {
-            model: facts.name,
+            model: model.name(),
             max: facts.coefficients.len(),
             names: facts.order(),
             got: coefficients.len(),
@@ -210,20 +251,11 @@ impl Lens {
         })
     }
 
-    /// The lens that this one alters, if it does: in a face's axes, scaled, or within an image circle.
-    fn altered(&self) -> Option<&Self> {
-        match self {
-            Self::Face(lens) => Some(lens.whole()),
-            Self::Scaled(lens) => Some(lens.whole()),
-            Self::Circle(lens) => Some(lens.whole()),
-            Self::Pinhole(_) | Self::BrownConrady(_) | Self::Radial(_) | Self::Direction(_) => None,
-        }
-    }
-
-    /// Whether it is another lens that is altered, which is inverted by that one's inverse.
+    /// Whether it is another lens that is altered, which is inverted by that one's inverse: in a face's axes, scaled, or
+    /// within an image circle.
     #[must_use]
     pub fn is_altered(&self) -> bool {
-        self.altered().is_some()
+        of_class!(self, lens => lens.altered().is_some())
     }
 
     /// The lens in the axes of the whole camera.
@@ -237,28 +269,12 @@ impl Lens {
 
     /// Which model this is.
     pub fn model(&self) -> LensModel {
-        match self {
-            Self::Pinhole(_) => LensModel::Pinhole,
-            Self::BrownConrady(_) => LensModel::BrownConrady,
-            Self::Radial(lens) => lens.model,
-            Self::Direction(lens) => lens.model,
-            Self::Face(_) | Self::Scaled(_) | Self::Circle(_) => {
-                self.altered().map_or(LensModel::Pinhole, Self::model)
-            }
-        }
+        of_class!(self, lens => lens.model())
     }
 
     /// All coefficients in the model's order, zeros included.
     pub fn coefficients(&self) -> &[f64] {
-        match self {
-            Self::Pinhole(_) => &[],
-            Self::BrownConrady(lens) => &lens.coefficients,
-            Self::Radial(lens) => &lens.coefficients,
-            Self::Direction(lens) => &lens.coefficients,
-            Self::Face(_) | Self::Scaled(_) | Self::Circle(_) => {
-                self.altered().map_or(&[], Self::coefficients)
-            }
-        }
+        of_class!(self, lens => lens.coefficients())
     }
 
     /// Whether the lens maps every point to itself, so that neither lens map nor lens inverse is needed.
@@ -274,154 +290,64 @@ impl Lens {
     /// tells whether the point is visible.
     #[inline]
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
-        match self {
-            Self::Pinhole(lens) => lens.distort(ideal),
-            Self::BrownConrady(lens) => lens.distort(ideal),
-            Self::Radial(lens) => lens.distort(ideal),
-            Self::Direction(lens) => lens.distort(ideal),
-            Self::Face(lens) => lens.distort(ideal),
-            Self::Scaled(lens) => lens.distort(ideal),
-            Self::Circle(lens) => lens.distort(ideal),
-        }
+        of_class!(self, lens => lens.distort(ideal))
     }
 
     /// `d distorted / d ideal`, analytic.
     pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        match self {
-            Self::Pinhole(lens) => lens.jacobian(ideal),
-            Self::BrownConrady(lens) => lens.jacobian(ideal),
-            Self::Radial(lens) => lens.jacobian(ideal),
-            Self::Direction(lens) => lens.jacobian(ideal),
-            Self::Face(lens) => lens.jacobian(ideal),
-            Self::Scaled(lens) => lens.jacobian(ideal),
-            Self::Circle(lens) => lens.jacobian(ideal),
-        }
+        of_class!(self, lens => lens.jacobian(ideal))
     }
 
     /// Inverse on the principal branch: the ideal point inside the fold with the image `distorted`. `None` if
     /// there is none, also for NaN and infinities.
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        match self {
-            Self::Pinhole(lens) => lens.undistort(distorted),
-            Self::BrownConrady(lens) => lens.undistort(distorted),
-            Self::Radial(lens) => lens.undistort(distorted),
-            Self::Direction(lens) => lens.undistort(distorted),
-            Self::Face(lens) => lens.undistort(distorted),
-            Self::Scaled(lens) => lens.undistort(distorted),
-            Self::Circle(lens) => lens.undistort(distorted),
-        }
+        of_class!(self, lens => lens.undistort(distorted))
     }
 
     /// Forward, from a ray of any length, also beside and behind the camera where the lens reaches so far
     /// ([`Lens::contains_ray`]).
     pub fn image(&self, ray: DVec3) -> DVec2 {
-        match self {
-            Self::Pinhole(_) | Self::BrownConrady(_) => self.distort(ray.truncate() / ray.z),
-            Self::Radial(lens) => lens.image(ray),
-            Self::Direction(lens) => lens.image(ray),
-            Self::Face(lens) => lens.image(ray),
-            Self::Scaled(lens) => lens.image(ray),
-            Self::Circle(lens) => lens.whole().image(ray),
-        }
+        of_class!(self, lens => lens.image(ray))
     }
 
     /// `d image / d (x, y, z)`, analytic: one column each. The product with the ray is zero.
     pub fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
-        match self {
-            Self::Pinhole(_) | Self::BrownConrady(_) => {
-                direction::gradient_of_plane(self.jacobian(ray.truncate() / ray.z), ray)
-            }
-            Self::Radial(lens) => lens.gradient(ray),
-            Self::Direction(lens) => lens.gradient(ray),
-            Self::Face(lens) => lens.gradient(ray),
-            Self::Scaled(lens) => lens.gradient(ray),
-            Self::Circle(lens) => lens.whole().gradient(ray),
-        }
+        of_class!(self, lens => lens.gradient(ray))
     }
 
     /// Inverse on the principal branch: the unit ray with the image `distorted`. `None` if there is none.
     pub fn ray(&self, distorted: DVec2) -> Option<DVec3> {
-        match self {
-            Self::Pinhole(_) | Self::BrownConrady(_) => {
-                self.undistort(distorted).map(|ideal| ideal.extend(1.0).normalize())
-            }
-            Self::Radial(lens) => lens.ray(distorted),
-            Self::Direction(lens) => lens.ray(distorted),
-            Self::Face(lens) => lens.ray(distorted),
-            Self::Scaled(lens) => lens.ray(distorted),
-            Self::Circle(lens) => lens.ray(distorted),
-        }
+        of_class!(self, lens => lens.ray(distorted))
     }
 
     /// Whether a ray lies on the principal branch, so that `ray(image(ray))` is its direction.
     pub fn contains_ray(&self, ray: DVec3) -> bool {
-        match self {
-            Self::Pinhole(_) | Self::BrownConrady(_) => ray.z > 0.0 && self.contains(ray.truncate() / ray.z),
-            Self::Radial(lens) => lens.contains_ray(ray),
-            Self::Direction(lens) => lens.contains_ray(ray),
-            Self::Face(lens) => lens.contains_ray(ray),
-            Self::Scaled(lens) => lens.contains_ray(ray),
-            Self::Circle(lens) => lens.contains_ray(ray),
-        }
+        of_class!(self, lens => lens.contains_ray(ray))
     }
 
     /// Largest angle off axis of a ray, radians.
     pub fn angle_max_rad(&self) -> f64 {
-        match self {
-            Self::Pinhole(_) => std::f64::consts::FRAC_PI_2,
-            Self::BrownConrady(lens) => lens.fold.range().1.atan(),
-            Self::Radial(lens) => lens.angle_max_rad(),
-            Self::Direction(lens) => lens.angle_max_rad(),
-            // Measured from the axis of the face.
-            Self::Face(_) => std::f64::consts::PI,
-            Self::Scaled(lens) => lens.whole().angle_max_rad(),
-            Self::Circle(lens) => lens.whole().angle_max_rad().min(lens.half_angle_rad()),
-        }
+        of_class!(self, lens => lens.angle_max_rad())
     }
 
     /// How much the lens magnifies on its axis; 1 for models whose focal length is that of the centre.
     pub fn axial_magnification(&self) -> f64 {
-        match self {
-            Self::Pinhole(_) | Self::BrownConrady(_) => 1.0,
-            Self::Face(lens) => lens.whole().axial_magnification(),
-            Self::Scaled(lens) => lens.axial_scale() * lens.whole().axial_magnification(),
-            Self::Circle(lens) => lens.whole().axial_magnification(),
-            Self::Radial(_) | Self::Direction(_) => self.jacobian(DVec2::ZERO).determinant().abs().sqrt(),
-        }
+        of_class!(self, lens => lens.axial_magnification())
     }
 
     /// Border of the principal branch, or `None` for a model without one.
     pub fn fold_curve(&self) -> Option<&FoldCurve> {
-        match self {
-            Self::Pinhole(_) | Self::Face(_) => None,
-            Self::BrownConrady(lens) => Some(&lens.fold),
-            Self::Radial(lens) => Some(&lens.fold),
-            Self::Direction(lens) => Some(&lens.fold),
-            Self::Scaled(lens) => lens.whole().fold_curve(),
-            Self::Circle(lens) => lens.whole().fold_curve(),
-        }
+        of_class!(self, lens => lens.fold_curve())
     }
 
     /// Start table of the inverse, or `None` for a model without one.
     pub fn radial_table(&self) -> Option<&RadialTable> {
-        match self {
-            Self::BrownConrady(lens) => Some(&lens.table),
-            Self::Radial(lens) => Some(&lens.table),
-            _ => None,
-        }
+        of_class!(self, lens => lens.radial_table())
     }
 
     /// Bound on the distorted radius of ideal points of the principal branch; infinite for a pinhole.
     pub fn distorted_max(&self) -> f64 {
-        match self {
-            Self::Pinhole(_) => f64::INFINITY,
-            Self::BrownConrady(lens) => lens.fold.distorted_max(),
-            Self::Radial(lens) => lens.distorted_max(),
-            Self::Direction(lens) => lens.fold.distorted_max(),
-            Self::Face(lens) => lens.whole().distorted_max(),
-            Self::Scaled(lens) => lens.distorted_max(),
-            Self::Circle(lens) => lens.whole().distorted_max(),
-        }
+        of_class!(self, lens => lens.distorted_max())
     }
 
     /// Ideal radius of the border of the principal branch in direction `phi` (radians from +u towards +v);
@@ -441,12 +367,7 @@ impl Lens {
 
     /// Whether an ideal point lies on the principal branch, so that `undistort(distort(ideal))` is `ideal`.
     pub fn contains(&self, ideal: DVec2) -> bool {
-        if self.is_altered() {
-            return ideal.is_finite() && self.contains_ray(ideal.extend(1.0));
-        }
-        // Most points are within every radius, and need no angle.
-        let is_near = ideal.length_squared() < self.contained_radius().powi(2);
-        is_near || ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
+        of_class!(self, lens => lens.contains(ideal))
     }
 }
 

@@ -5,7 +5,7 @@ mod common;
 use std::convert::Infallible;
 
 use camsim_core::{
-    lens::{GridOf, Lens, LensGrid, LensModel, ModelFacts, RayChart},
+    lens::{GridOf, Lens, LensGrid, LensModel, RayChart},
     reference::{Oracle, RenderOptions},
     scenario::{Channel, LensSpec, LoadedFile, MountSpec, Scenario},
 };
@@ -95,7 +95,7 @@ fn every_model_shows_what_the_reference_renderer_shows() {
             .flat_map(|(a, b)| (0..3).map(|i| f64::from(a[i] - b[i]).powi(2)))
             .sum();
         let psnr_db = -10.0 * (squares / (3 * both) as f64).log10();
-        let name = ModelFacts::of(model).name;
+        let name = model.name();
         eprintln!("{name}: {psnr_db:.1} dB over {both} pixels, {differ} valid in one alone");
         assert!(both > 18_000 && differ <= 3, "{name}: {both} pixels, {differ} valid in one alone");
         assert!(psnr_db > LEAST_PSNR_DB, "{name}: {psnr_db:.1} dB");

@@ -5,7 +5,6 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use camsim_core::lens::ModelFacts;
 use camsim_core::scenario::{CameraSpec, LensModel};
 use camsim_io::camera_file::{CameraFileError, camera_names, import_camera_named};
 
@@ -49,7 +48,7 @@ fn row(table: &mut String, file: &str, path: &Path, camera: Option<&str>) -> Opt
         Ok(imported) => {
             let spec = &imported.spec;
             let [cx, cy] = spec.principal_point_px.unwrap();
-            let model = ModelFacts::of(spec.lens.model).name;
+            let model = spec.lens.model.name();
             let readout = if spec.shutter.readout_ms == 0.0 {
                 "0".to_owned()
             } else {

@@ -3,17 +3,31 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
+use super::LensModel;
 use super::bulk::PlaneFormula;
+use super::class::LensClass;
 use super::facts::{ModelFacts, Shape};
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular_angle};
 use super::radial_table::RadialTable;
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "brown-conrady",
     coefficients: &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"],
-    defaults: &[],
     fix: "thin-prism and tilt terms are those of model \"brown-conrady-prism\"",
     shape: |_| Shape::BrownConrady,
+    foreign: &[
+        "radtan",
+        "radialtangential",
+        "plumbbob",
+        "radtan5",
+        "rationalpolynomial",
+        "rational",
+        "radtan8",
+    ],
+    foreign_counts: &[0, 2, 4, 5, 8],
+    point: "`(u, v) N/D + tangential`: eqs. 8 and 9 of the paper",
+    authority: "OpenCV, 4, 5 or 8 coefficients; ROS `plumb_bob`, `rational_polynomial`; COLMAP `OPENCV`, `FULL_OPENCV`",
+    field: "< 178",
+    ..ModelFacts::NONE
 };
 
 /// Most Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the
@@ -59,31 +73,6 @@ impl BrownConrady {
             .tan();
         let table = RadialTable::new(radial_fold, reach, 1.0, |r| radial.distort(DVec2::new(r, 0.0)).x);
         Self { coefficients, fold, table }
-    }
-
-    /// Forward; the formula is that of the type.
-    pub fn distort(&self, ideal: DVec2) -> DVec2 {
-        Formula::new(&self.coefficients).distort(ideal)
-    }
-
-    /// `[[a, b], [b, c]]` with `a = d + s u^2 + 2 p1 v + 6 p2 u`, `b = s u v + 2 p1 u + 2 p2 v`, `c = d + s
-    /// v^2 + 6 p1 v + 2 p2 u`, where `s = 2 dd/d(r^2) = 2 (N' - D' d) / D`.
-    pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        Formula::new(&self.coefficients).jacobian(ideal)
-    }
-
-    /// Guarded Newton iteration. It starts from the radial table; each step is pulled back where it would
-    /// leave the principal branch, and halved where the residual grew. A result must reproduce the distorted
-    /// point, lie inside the fold and have a positive determinant. On a branch whose border is a simple curve
-    /// these conditions exclude every wrong root.
-    pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        let radius = distorted.length();
-        if !distorted.is_finite() || radius > self.fold.distorted_max() {
-            return None;
-        }
-        let from_table = distorted * self.table.ratio(radius);
-        // The second start is for strong tangential terms, where the radial table is a poor guess.
-        self.newton(distorted, from_table).or_else(|| self.newton(distorted, 0.5 * distorted))
     }
 
     fn newton(&self, distorted: DVec2, start: DVec2) -> Option<DVec2> {
@@ -137,6 +126,56 @@ impl BrownConrady {
             return to;
         }
         to.normalize_or_zero() * (0.5 * (from.length().min(fold_radius) + fold_radius))
+    }
+}
+
+impl LensClass for BrownConrady {
+    fn model(&self) -> LensModel {
+        LensModel::BrownConrady
+    }
+
+    fn coefficients(&self) -> &[f64] {
+        &self.coefficients
+    }
+
+    fn distort(&self, ideal: DVec2) -> DVec2 {
+        Formula::new(&self.coefficients).distort(ideal)
+    }
+
+    /// `[[a, b], [b, c]]` with `a = d + s u^2 + 2 p1 v + 6 p2 u`, `b = s u v + 2 p1 u + 2 p2 v`, `c = d + s
+    /// v^2 + 6 p1 v + 2 p2 u`, where `s = 2 dd/d(r^2) = 2 (N' - D' d) / D`.
+    fn jacobian(&self, ideal: DVec2) -> DMat2 {
+        Formula::new(&self.coefficients).jacobian(ideal)
+    }
+
+    /// Guarded Newton iteration. It starts from the radial table; each step is pulled back where it would
+    /// leave the principal branch, and halved where the residual grew. A result must reproduce the distorted
+    /// point, lie inside the fold and have a positive determinant. On a branch whose border is a simple curve
+    /// these conditions exclude every wrong root.
+    fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+        let radius = distorted.length();
+        if !distorted.is_finite() || radius > self.fold.distorted_max() {
+            return None;
+        }
+        let from_table = distorted * self.table.ratio(radius);
+        // The second start is for strong tangential terms, where the radial table is a poor guess.
+        self.newton(distorted, from_table).or_else(|| self.newton(distorted, 0.5 * distorted))
+    }
+
+    fn angle_max_rad(&self) -> f64 {
+        self.fold.range().1.atan()
+    }
+
+    fn fold_curve(&self) -> Option<&FoldCurve> {
+        Some(&self.fold)
+    }
+
+    fn radial_table(&self) -> Option<&RadialTable> {
+        Some(&self.table)
+    }
+
+    fn distorted_max(&self) -> f64 {
+        self.fold.distorted_max()
     }
 }
 

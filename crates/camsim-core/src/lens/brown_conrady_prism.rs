@@ -1,6 +1,11 @@
 //! Brown-Conrady with thin prism and a tilted sensor: OpenCV's 12 and 14 coefficients (`calib3d`, section
 //! "Detailed Description": s1 to s4, and tau_x, tau_y of Louhichi et al. 2007).
 
+use std::{
+    f64::consts::FRAC_PI_4,
+    ops::Bound::{self, Included},
+};
+
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
 use super::brown_conrady::Formula;
@@ -10,12 +15,22 @@ use super::facts::ModelFacts;
 use super::fold::MAX_FIELD_RAD;
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "brown-conrady-prism",
     coefficients: &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"],
-    defaults: &[],
     fix: "OpenCV has no more than 14",
     shape: |k| direction(Prism::new(k)),
+    ranges: &[("tau_x", TILT, TILT_HINT), ("tau_y", TILT, TILT_HINT)],
+    foreign: &["radtan12", "radtan14", "thinprism", "thinprismmodel", "tilted", "fullopencv14"],
+    foreign_counts: &[12, 14],
+    point: "brown-conrady `+ (s1 r^2 + s2 r^4, s3 r^2 + s4 r^4)`, then the tilt of the sensor by tau_x and tau_y \
+            (radians)",
+    authority: "OpenCV, 12 or 14 coefficients",
+    field: "< 178",
+    ..ModelFacts::NONE
 };
+
+/// Far more than any sensor is tilted.
+const TILT: (Bound<f64>, Bound<f64>) = (Included(-FRAC_PI_4), Included(FRAC_PI_4));
+const TILT_HINT: &str = "-pi/4 to pi/4: a tilt is in radians";
 
 /// `(x, y)` of Brown-Conrady plus `(s1 r^2 + s2 r^4, s3 r^2 + s4 r^4)`, then the tilt.
 ///

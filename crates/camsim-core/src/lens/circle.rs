@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::Lens;
+use super::{Lens, class::LensClass};
 use crate::scenario::ImageCircleSpec;
 
 /// Pixels whose distance is the radius to within rounding are shown.
@@ -37,34 +37,47 @@ impl CircleLens {
         &self.whole
     }
 
-    /// Largest angle off axis that it shows.
-    pub(super) fn half_angle_rad(&self) -> f64 {
-        self.half_angle_rad
-    }
-
     pub(super) fn shows(&self, ray: DVec3, distorted: DVec2) -> bool {
         ((distorted - self.centre) * self.focal_px).length() <= self.radius_px + HAIR_PX
             && ray.truncate().length().atan2(ray.z) <= self.half_angle_rad
     }
+}
 
-    pub(super) fn distort(&self, ideal: DVec2) -> DVec2 {
+impl LensClass for CircleLens {
+    fn altered(&self) -> Option<&Lens> {
+        Some(&self.whole)
+    }
+
+    fn distort(&self, ideal: DVec2) -> DVec2 {
         self.whole.distort(ideal)
     }
 
-    pub(super) fn jacobian(&self, ideal: DVec2) -> DMat2 {
+    fn jacobian(&self, ideal: DVec2) -> DMat2 {
         self.whole.jacobian(ideal)
     }
 
-    pub(super) fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+    fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         self.whole.undistort(distorted).filter(|ideal| self.shows(ideal.extend(1.0), distorted))
     }
 
-    pub(super) fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+    fn image(&self, ray: DVec3) -> DVec2 {
+        self.whole.image(ray)
+    }
+
+    fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+        self.whole.gradient(ray)
+    }
+
+    fn ray(&self, distorted: DVec2) -> Option<DVec3> {
         self.whole.ray(distorted).filter(|ray| self.shows(*ray, distorted))
     }
 
-    pub(super) fn contains_ray(&self, ray: DVec3) -> bool {
+    fn contains_ray(&self, ray: DVec3) -> bool {
         self.whole.contains_ray(ray) && self.shows(ray, self.whole.image(ray))
+    }
+
+    fn angle_max_rad(&self) -> f64 {
+        self.whole.angle_max_rad().min(self.half_angle_rad)
     }
 }
 

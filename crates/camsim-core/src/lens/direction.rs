@@ -7,6 +7,7 @@ use glam::{DMat2, DVec2, DVec3};
 use super::LensModel;
 use super::branch::{Branch, ChartMap};
 use super::bulk::PlaneFormula;
+use super::class::LensClass;
 use super::fold::{FoldCurve, MAX_FIELD_RAD};
 
 /// A distorted point as a function of the ray.
@@ -87,35 +88,39 @@ impl DirectionLens {
         Self { model, coefficients, formula, fold, branch }
     }
 
-    /// Forward, from an ideal point.
-    pub fn distort(&self, ideal: DVec2) -> DVec2 {
-        self.formula.image(ideal.extend(1.0))
+    /// Angle off axis within which every ray lies on the principal branch, radians.
+    pub(super) fn smallest_angle(&self) -> f64 {
+        self.branch.as_ref().map_or(0.0, |branch| branch.radius_min())
     }
 
-    /// `d distorted / d ideal`.
-    pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        let [x, y, _] = self.formula.gradient(ideal.extend(1.0));
-        DMat2::from_cols(x, y)
+    pub(super) fn plane(&self) -> Option<&dyn PlaneFormula> {
+        self.formula.plane()
+    }
+}
+
+impl LensClass for DirectionLens {
+    fn model(&self) -> LensModel {
+        self.model
     }
 
-    /// Forward, from a ray of any length.
-    pub fn image(&self, ray: DVec3) -> DVec2 {
-        self.formula.image(ray)
+    fn coefficients(&self) -> &[f64] {
+        &self.coefficients
     }
 
-    /// `d image / d (x, y, z)`: one column each.
-    pub fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
-        self.formula.gradient(ray)
-    }
-
-    /// The ideal point; `None` beyond the principal branch and beyond `MAX_FIELD_RAD`.
-    pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+    fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         let ray = self.ray(distorted)?;
         (ray.z > MAX_FIELD_RAD.cos() * ray.length()).then(|| ray.truncate() / ray.z)
     }
 
-    /// The unit ray of a distorted point; `None` beyond the principal branch.
-    pub fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+    fn image(&self, ray: DVec3) -> DVec2 {
+        self.formula.image(ray)
+    }
+
+    fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+        self.formula.gradient(ray)
+    }
+
+    fn ray(&self, distorted: DVec2) -> Option<DVec3> {
         if !distorted.is_finite() {
             return None;
         }
@@ -126,26 +131,27 @@ impl DirectionLens {
         }
     }
 
-    /// Whether a ray lies on the principal branch.
-    pub fn contains_ray(&self, ray: DVec3) -> bool {
+    fn contains_ray(&self, ray: DVec3) -> bool {
         match &self.branch {
             Some(branch) => branch.contains(&Angles(&*self.formula), angles_of(ray)),
             None => self.formula.image(ray).is_finite(),
         }
     }
 
-    /// Largest angle off axis of a ray, radians.
-    pub fn angle_max_rad(&self) -> f64 {
+    fn angle_max_rad(&self) -> f64 {
         self.branch.as_ref().map_or(PI, |branch| branch.radius_max())
     }
 
-    /// Angle off axis within which every ray lies on the principal branch, radians.
-    pub(super) fn smallest_angle(&self) -> f64 {
-        self.branch.as_ref().map_or(0.0, |branch| branch.radius_min())
+    fn axial_magnification(&self) -> f64 {
+        self.jacobian(DVec2::ZERO).determinant().abs().sqrt()
     }
 
-    pub(super) fn plane(&self) -> Option<&dyn PlaneFormula> {
-        self.formula.plane()
+    fn fold_curve(&self) -> Option<&FoldCurve> {
+        Some(&self.fold)
+    }
+
+    fn distorted_max(&self) -> f64 {
+        self.fold.distorted_max()
     }
 }
 

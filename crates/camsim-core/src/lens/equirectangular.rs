@@ -9,11 +9,14 @@ use super::direction::{ClosedInverse, DirectionFormula, direction};
 use super::facts::ModelFacts;
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "equirectangular",
-    coefficients: &[],
-    defaults: &[],
     fix: "leave them out: W / (2 pi) as camera.focal_px shows all around",
     shape: |_| direction(Equirectangular),
+    foreign: &["equirectangular", "spherical"],
+    foreign_counts: &[0],
+    point: "longitude and latitude, `(atan2(x, z), atan2(y, hypot(x, z)))`; `focal_px = W / (2 pi)` shows all around",
+    authority: "COLMAP `EQUIRECTANGULAR`",
+    field: "all",
+    ..ModelFacts::NONE
 };
 
 /// `(atan2(x, z), atan2(y, hypot(x, z)))`.

@@ -9,25 +9,22 @@ use glam::{DMat2, DVec2};
 use super::facts::{ModelFacts, Shape};
 use super::radial::RadialFormula;
 
-const COEFFICIENTS: &[&str] = &["k1", "k2", "k3", "k4", "k5", "c", "d", "e", "max_angle"];
-const DEFAULTS: &[f64] = &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-const FIX: &str =
-    "the polynomial has five terms, then c d e of the linear map and the largest angle in radians";
-
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "f-theta",
-    coefficients: COEFFICIENTS,
-    defaults: DEFAULTS,
-    fix: FIX,
+    coefficients: &["k1", "k2", "k3", "k4", "k5", "c", "d", "e", "max_angle"],
+    defaults: &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+    fix: "the polynomial has five terms, then c d e of the linear map and the largest angle in radians",
     shape: |k| shape(k, FTheta { k: polynomial(k), angle_max: angle_max(k) }),
+    point: "`[[c, d], [e, 1]] (k1 t + .. + k5 t^5) e`",
+    authority: "NVIDIA's `angle_to_pixeldist_poly`, over the focal length",
+    field: "360",
+    ..ModelFacts::NONE
 };
 
 pub(super) const INVERSE_FACTS: ModelFacts = ModelFacts {
-    name: "f-theta-inverse",
-    coefficients: COEFFICIENTS,
-    defaults: DEFAULTS,
-    fix: FIX,
     shape: |k| shape(k, FThetaInverse::new(polynomial(k), angle_max(k))),
+    point: "as before, with `t = k1 p + .. + k5 p^5` for the length p",
+    authority: "NVIDIA's `pixeldist_to_angle_poly`",
+    ..FACTS
 };
 
 /// The image is `[[c, d], [e, 1]]` times the symmetric lens's.

@@ -4,9 +4,11 @@
 //! about the camera, of which the front one looks along the optical axis. A face's camera is turned, and its
 //! lens is the whole lens in the face's axes: the output pixels stay those of the whole camera.
 
-use glam::{DMat2, DMat3, DVec2, DVec3};
+use std::f64::consts::PI;
 
-use super::Lens;
+use glam::{DMat3, DVec2, DVec3};
+
+use super::{FoldCurve, Lens, class::LensClass};
 use crate::scenario::Face;
 
 /// Largest tangent at which a face is used: it holds tangents of 1, and what is about a pixel at its border.
@@ -38,20 +40,6 @@ impl FaceLens {
         &self.whole
     }
 
-    pub(super) fn distort(&self, ideal: DVec2) -> DVec2 {
-        self.image(ideal.extend(1.0))
-    }
-
-    pub(super) fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        let [x, y, _] = self.gradient(ideal.extend(1.0));
-        DMat2::from_cols(x, y)
-    }
-
-    /// `None` for points that other faces hold, but for those near the border.
-    pub(super) fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        self.ideal(self.whole.ray(distorted)?)
-    }
-
     /// Ideal point of a ray of the whole camera that this face is made from.
     pub(crate) fn held(&self, whole: DVec3) -> Option<DVec2> {
         if whole.is_nan() || Face::of(whole) != self.face { None } else { self.ideal(whole) }
@@ -63,26 +51,46 @@ impl FaceLens {
         (ray.z > 0.0 && uv.abs().max_element() <= MOST_TANGENT).then_some(uv)
     }
 
-    pub(super) fn image(&self, ray: DVec3) -> DVec2 {
+    /// Whether this is the face that an output pixel is made from.
+    pub(super) fn holds(&self, distorted: DVec2) -> bool {
+        self.whole.ray(distorted).is_some_and(|ray| Face::of(ray) == self.face)
+    }
+}
+
+impl LensClass for FaceLens {
+    fn altered(&self) -> Option<&Lens> {
+        Some(&self.whole)
+    }
+
+    /// `None` for points that other faces hold, but for those near the border.
+    fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+        self.ideal(self.whole.ray(distorted)?)
+    }
+
+    fn image(&self, ray: DVec3) -> DVec2 {
         self.whole.image(self.whole_from_face * ray)
     }
 
-    pub(super) fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+    fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
         let [x, y, z] = self.whole.gradient(self.whole_from_face * ray);
         let along = |axis: DVec3| x * axis.x + y * axis.y + z * axis.z;
         [self.whole_from_face.x_axis, self.whole_from_face.y_axis, self.whole_from_face.z_axis].map(along)
     }
 
-    pub(super) fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+    fn ray(&self, distorted: DVec2) -> Option<DVec3> {
         Some(self.whole_from_face.transpose() * self.whole.ray(distorted)?)
     }
 
-    pub(super) fn contains_ray(&self, ray: DVec3) -> bool {
+    fn contains_ray(&self, ray: DVec3) -> bool {
         self.whole.contains_ray(self.whole_from_face * ray)
     }
 
-    /// Whether this is the face that an output pixel is made from.
-    pub(super) fn holds(&self, distorted: DVec2) -> bool {
-        self.whole.ray(distorted).is_some_and(|ray| Face::of(ray) == self.face)
+    /// Measured from the axis of the face.
+    fn angle_max_rad(&self) -> f64 {
+        PI
+    }
+
+    fn fold_curve(&self) -> Option<&FoldCurve> {
+        None
     }
 }

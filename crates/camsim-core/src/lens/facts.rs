@@ -1,28 +1,34 @@
-//! What is known of each lens model before there is a lens: its name, its coefficients, its formula.
+//! What is known of each lens model before there is a lens: its coefficients, its formula, its names elsewhere.
 
-use std::sync::Arc;
+use std::{ops::Bound, sync::Arc};
 
 use glam::DMat2;
 
-use super::{
-    LensModel, brown_conrady, brown_conrady_prism, direction::DirectionFormula, division, double_sphere,
-    equirectangular, eucm, f_theta, fisheye624, fov, kannala_brandt, mei, pinhole, radial::RadialFormula,
-    table, ucm,
-};
+use super::{direction::DirectionFormula, radial::RadialFormula};
 
 /// Facts of a lens model.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelFacts {
-    /// Name in files.
-    pub name: &'static str,
     /// Names of the coefficients, in order.
     pub coefficients: &'static [&'static str],
     /// Values of coefficients that are left out; empty: zeros.
     pub(super) defaults: &'static [f64],
     /// What to do with more coefficients than these.
     pub fix: &'static str,
+    /// Coefficients that the model is not defined for all values of: name, values, and these in words with a hint.
+    pub(crate) ranges: &'static [(&'static str, (Bound<f64>, Bound<f64>), &'static str)],
     /// How the lens is computed, from all coefficients.
     pub(super) shape: fn(&[f64]) -> Shape,
+    /// Names in calibration files: letters and digits alone, in lower case.
+    pub(super) foreign: &'static [&'static str],
+    /// The counts of parameters that such a file may give, in the order of the coefficients.
+    pub(super) foreign_counts: &'static [usize],
+    /// The distorted point as docs/reference/LENSES.md writes it.
+    pub point: &'static str,
+    /// Who defines it.
+    pub authority: &'static str,
+    /// Largest field of view, degrees.
+    pub field: &'static str,
 }
 
 /// The classes of lenses that share an inverse.
@@ -39,27 +45,20 @@ pub(super) enum Shape {
 }
 
 impl ModelFacts {
-    /// What is known of a model.
-    #[must_use]
-    pub const fn of(model: LensModel) -> &'static Self {
-        match model {
-            LensModel::Pinhole => &pinhole::FACTS,
-            LensModel::BrownConrady => &brown_conrady::FACTS,
-            LensModel::KannalaBrandt => &kannala_brandt::FACTS,
-            LensModel::BrownConradyPrism => &brown_conrady_prism::FACTS,
-            LensModel::Fisheye624 => &fisheye624::FACTS,
-            LensModel::FTheta => &f_theta::FACTS,
-            LensModel::FThetaInverse => &f_theta::INVERSE_FACTS,
-            LensModel::DoubleSphere => &double_sphere::FACTS,
-            LensModel::Eucm => &eucm::FACTS,
-            LensModel::Ucm => &ucm::FACTS,
-            LensModel::Mei => &mei::FACTS,
-            LensModel::Division => &division::FACTS,
-            LensModel::Fov => &fov::FACTS,
-            LensModel::Equirectangular => &equirectangular::FACTS,
-            LensModel::Table => &table::FACTS,
-        }
-    }
+    /// What a model leaves out.
+    pub(super) const NONE: Self = Self {
+        coefficients: &[],
+        defaults: &[],
+        fix: "",
+        ranges: &[],
+        shape: |_| Shape::Pinhole,
+        foreign: &[],
+        foreign_counts: &[],
+        point: "",
+        authority: "",
+        field: "",
+    };
+
     /// The names of the coefficients in one line.
     #[must_use]
     pub fn order(&self) -> String {
@@ -79,22 +78,36 @@ impl ModelFacts {
 }
 
 #[cfg(test)]
-mod tests {
+mod listing {
     #![allow(clippy::unwrap_used)]
 
-    use serde::{
-        Deserialize,
-        de::{IntoDeserializer, value::Error},
-    };
+    use std::{env, fs, path::Path};
 
-    use super::*;
+    use super::ModelFacts;
+    use crate::scenario::LensModel;
 
+    const HEAD: &str =
+        "| model | coefficients | distorted point | authority | field |\n|---|---|---|---|---|\n";
+
+    /// `CAMSIM_BLESS=1 cargo test --workspace --lib listing` writes it.
     #[test]
-    fn names_are_those_of_files() {
-        for &model in LensModel::ALL {
-            assert_eq!(model.name(), ModelFacts::of(model).name);
-            let name = IntoDeserializer::<Error>::into_deserializer(ModelFacts::of(model).name);
-            assert_eq!(LensModel::deserialize(name).unwrap(), model);
+    fn the_table_of_models_is_up_to_date() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/LENSES.md");
+        let page = fs::read_to_string(&path).unwrap();
+        let (before, rest) = page.split_once(HEAD).unwrap();
+        let (_, after) = rest.split_once("\n\n").unwrap();
+        let mut wanted = before.to_owned() + HEAD;
+        for model in LensModel::ALL {
+            let facts = ModelFacts::of(*model);
+            let names = facts.order();
+            let names = if facts.coefficients.is_empty() { names } else { format!("`{names}`") };
+            let cells = [&format!("`{}`", model.name()), &names, facts.point, facts.authority, facts.field];
+            wanted += &format!("| {} |\n", cells.join(" | ")).replace("  ", " ");
         }
+        wanted = wanted + "\n" + after;
+        if env::var_os("CAMSIM_BLESS").is_some_and(|bless| bless == "1") {
+            fs::write(&path, &wanted).unwrap();
+        }
+        assert!(fs::read_to_string(&path).unwrap() == wanted, "LENSES.md: write it with CAMSIM_BLESS=1");
     }
 }

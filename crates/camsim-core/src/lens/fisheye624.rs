@@ -7,9 +7,7 @@ use super::direction::{DirectionFormula, angles_gradient, angles_of, direction};
 use super::facts::ModelFacts;
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "fisheye624",
     coefficients: &["k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"],
-    defaults: &[],
     fix: "six radial, two tangential and four thin-prism terms; the focal length is camera.focal_px",
     shape: |k| {
         direction(Fisheye624 {
@@ -18,6 +16,12 @@ pub(super) const FACTS: ModelFacts = ModelFacts {
             s: [k[8], k[9], k[10], k[11]],
         })
     },
+    foreign: &["radtanthinprismfisheye", "fisheye624", "fisheyeradtanthinprism"],
+    foreign_counts: &[12],
+    point: "`w = (1 + k0 t^2 + .. + k5 t^12) t e`, q = \\|w\\|^2: `w + 2 (w.p) w + q p + (s0 q + s1 q^2, s2 q + s3 q^2)`",
+    authority: "COLMAP `RAD_TAN_THIN_PRISM_FISHEYE` (id 11); Project Aria Fisheye624",
+    field: "360",
+    ..ModelFacts::NONE
 };
 
 /// With `w = (1 + k0 t^2 + ... + k5 t^12) t e` and `q = |w|^2`:

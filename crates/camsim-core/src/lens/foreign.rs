@@ -29,42 +29,15 @@ pub enum ForeignLensError {
     },
 }
 
-/// Names (letters and digits alone, in lower case), the model, and the counts of parameters that a file may give.
-/// Their order is camsim's.
-const NAMES: [(&[&str], LensModel, &[usize]); 11] = [
-    (
-        &["radtan", "radialtangential", "plumbbob", "radtan5", "rationalpolynomial", "rational", "radtan8"],
-        LensModel::BrownConrady,
-        &[0, 2, 4, 5, 8],
-    ),
-    (
-        &["radtan12", "radtan14", "thinprism", "thinprismmodel", "tilted", "fullopencv14"],
-        LensModel::BrownConradyPrism,
-        &[12, 14],
-    ),
-    (
-        &["equidistant", "equi", "fisheye", "kannalabrandt", "kannalabrandt4", "kannalabrandt8", "kb4"],
-        LensModel::KannalaBrandt,
-        &[0, 4],
-    ),
-    (&["radtanthinprismfisheye", "fisheye624", "fisheyeradtanthinprism"], LensModel::Fisheye624, &[12]),
-    (&["ds", "doublesphere"], LensModel::DoubleSphere, &[2]),
-    (&["eucm", "extendedunified", "extendedunifiedcameramodel"], LensModel::Eucm, &[2]),
-    (&["ucm", "unified"], LensModel::Ucm, &[1]),
-    (&["omni", "omniradtan", "mei", "omnidir"], LensModel::Mei, &[1, 5]),
-    (&["fov", "atan"], LensModel::Fov, &[1]),
-    (&["division", "simpledivision"], LensModel::Division, &[1]),
-    (&["equirectangular", "spherical"], LensModel::Equirectangular, &[0]),
-];
-
 /// Model and coefficients of a lens by its name in a calibration file, in any spelling (`radtan`,
 /// `RAD_TAN_THIN_PRISM_FISHEYE`, `double sphere`). The parameters are those beside focal length and principal
 /// point, in the order of the model's authority: `xi alpha` (double sphere), `alpha beta` (EUCM), `xi k1 k2 p1 p2`
 /// (omni, MEI), OpenCV's order (radial-tangential).
 pub fn foreign_lens(name: &str, parameters: &[f64]) -> Result<ForeignLens, ForeignLensError> {
-    let (_, model, counts) = named(name).ok_or_else(|| ForeignLensError::Unknown(name.to_owned()))?;
+    let model = foreign_model(name).ok_or_else(|| ForeignLensError::Unknown(name.to_owned()))?;
+    let counts = ModelFacts::of(model).foreign_counts;
     // OpenCV names all its models alike: the thin prism shows in the count.
-    let is_prism = *model == LensModel::BrownConrady && [12, 14].contains(&parameters.len());
+    let is_prism = model == LensModel::BrownConrady && [12, 14].contains(&parameters.len());
     if is_prism {
         let is_used = parameters[8..].iter().any(|k| *k != 0.0);
         let model = if is_used { LensModel::BrownConradyPrism } else { LensModel::BrownConrady };
@@ -79,19 +52,15 @@ pub fn foreign_lens(name: &str, parameters: &[f64]) -> Result<ForeignLens, Forei
             got: parameters.len(),
         });
     }
-    Ok(ForeignLens { model: *model, coefficients: parameters.to_vec() })
+    Ok(ForeignLens { model, coefficients: parameters.to_vec() })
 }
 
 /// The model that other programs give this name, in any spelling.
 #[must_use]
 pub fn foreign_model(name: &str) -> Option<LensModel> {
-    named(name).map(|(_, model, _)| *model)
-}
-
-fn named(name: &str) -> Option<&'static (&'static [&'static str], LensModel, &'static [usize])> {
     let plain: String =
         name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
-    NAMES.iter().find(|(names, ..)| names.contains(&plain.as_str()))
+    LensModel::ALL.iter().copied().find(|model| ModelFacts::of(*model).foreign.contains(&plain.as_str()))
 }
 
 /// Focal length in pixels, and the lens, of an f-theta polynomial in pixels (`p[0]` is the constant term, which

@@ -1,15 +1,22 @@
 //! Field-of-view model: Devernay, Faugeras, "Straight lines have to be straight" (2001), sect. 2.3; COLMAP's FOV,
 //! PTAM's and SVO's ATAN.
 
+use std::{f64::consts::PI, ops::Bound::Excluded};
+
 use super::facts::ModelFacts;
 use super::radial::{RadialFormula, radial};
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "fov",
     coefficients: &["omega"],
-    defaults: &[],
     fix: "the model has one, its field of view in radians",
     shape: |k| radial(Fov { omega: k[0] }),
+    ranges: &[("omega", (Excluded(-PI), Excluded(PI)), "below pi: it is the field of view in radians")],
+    foreign: &["fov", "atan"],
+    foreign_counts: &[1],
+    point: "`atan(2 tan(t) tan(omega/2)) / omega e`",
+    authority: "Devernay and Faugeras 2001; COLMAP `FOV`; PTAM, SVO `ATAN`",
+    field: "360",
+    ..ModelFacts::NONE
 };
 
 /// `r = atan(2 tan t tan(omega / 2)) / omega`; `tan t` where omega is 0.

@@ -1,6 +1,8 @@
 //! Omnidirectional model of Mei, Rives, "Single View Point Omnidirectional Camera Calibration from Planar Grids"
 //! (ICRA 2007): OpenCV's `omnidir`, CamOdoCal's MEI, Kalibr's omni-radtan.
 
+use std::ops::Bound::{Excluded, Unbounded};
+
 use glam::{DMat2, DVec2, DVec3};
 
 use super::brown_conrady::Formula;
@@ -9,14 +11,19 @@ use super::direction::{DirectionFormula, direction};
 use super::facts::ModelFacts;
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "mei",
     coefficients: &["xi", "k1", "k2", "p1", "p2"],
-    defaults: &[],
     fix: "xi, two radial and two tangential terms; the focal length is camera.focal_px",
     shape: |k| {
         let formula = Formula::new(&[k[1], k[2], k[3], k[4], 0.0, 0.0, 0.0, 0.0]);
         direction(Mei { xi: k[0], formula })
     },
+    ranges: &[("xi", (Excluded(-1.0), Unbounded), "above -1; a pinhole has 0")],
+    foreign: &["omni", "omniradtan", "mei", "omnidir"],
+    foreign_counts: &[1, 5],
+    point: "brown-conrady of `(x, y) / (z + xi \\|ray\\|)`",
+    authority: "OpenCV `omnidir`; CamOdoCal `MEI`; Kalibr `omni` with `radtan`",
+    field: "360",
+    ..ModelFacts::NONE
 };
 
 /// Brown-Conrady of `(x, y) / (z + xi |ray|)`.

@@ -5,6 +5,7 @@ use std::{f64::consts::PI, fmt::Debug, sync::Arc};
 use glam::{DMat2, DVec2, DVec3};
 
 use super::LensModel;
+use super::class::LensClass;
 use super::fold::{FoldCurve, MAX_FIELD_RAD, first_irregular, first_irregular_angle};
 use super::radial_table::RadialTable;
 
@@ -89,105 +90,6 @@ impl RadialLens {
         self.theta_max
     }
 
-    /// Largest angle off axis of a ray, radians.
-    pub fn angle_max_rad(&self) -> f64 {
-        self.angle_max
-    }
-
-    /// Bound on the distorted radius of ideal points.
-    pub fn distorted_max(&self) -> f64 {
-        match self.linear {
-            None => self.formula.radius(self.theta_max),
-            Some(_) => self.fold.distorted_max(),
-        }
-    }
-
-    /// Forward, from an ideal point.
-    pub fn distort(&self, ideal: DVec2) -> DVec2 {
-        distort(&*self.formula, self.linear.as_ref(), ideal)
-    }
-
-    /// `t I + (m - t) e e^T` with `e = (u, v)/r`, the tangential magnification `t = g(theta) / r` and the
-    /// meridional one `m = g'(theta) / (1 + r^2)`.
-    pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        let r = ideal.length();
-        let jacobian = if r < ON_AXIS {
-            DMat2::IDENTITY * self.formula.slope(0.0)
-        } else {
-            let theta = r.atan();
-            let tangential = self.formula.radius(theta) / r;
-            let meridional = self.formula.slope(theta) / (1.0 + r * r);
-            let e = ideal / r;
-            let outer = DMat2::from_cols(e * e.x, e * e.y);
-            DMat2::IDENTITY * tangential + outer * (meridional - tangential)
-        };
-        self.linear.map_or(jacobian, |[linear, _]| linear * jacobian)
-    }
-
-    /// The ideal point; `None` beyond the largest angle of a plane.
-    pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        let distorted = self.without_linear(distorted);
-        let radius = distorted.length();
-        if !distorted.is_finite() || radius > self.formula.radius(self.theta_max) {
-            return None;
-        }
-        if radius < 1e-12 {
-            return Some(distorted / self.formula.slope(0.0));
-        }
-        Some(distorted * (self.angle_of(radius, self.theta_max).tan() / radius))
-    }
-
-    /// Forward, from a ray of any length.
-    pub fn image(&self, ray: DVec3) -> DVec2 {
-        let across = ray.truncate();
-        let r = across.length();
-        let image = if r < ON_AXIS * ray.z {
-            across * (self.formula.slope(0.0) / ray.z)
-        } else {
-            // Straight behind, every direction of the image is as good.
-            let e = across.try_normalize().unwrap_or(DVec2::X);
-            e * self.formula.radius(r.atan2(ray.z))
-        };
-        self.linear.map_or(image, |[linear, _]| linear * image)
-    }
-
-    /// `d image / d (x, y, z)`: one column each.
-    pub fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
-        let (across, n2) = (ray.truncate(), ray.length_squared());
-        let r = across.length();
-        let columns = if r < ON_AXIS * ray.z {
-            let slope = self.formula.slope(0.0) / ray.z;
-            [DVec2::X * slope, DVec2::Y * slope, -across * (slope / ray.z)]
-        } else {
-            let theta = r.atan2(ray.z);
-            let (e, slope) = (across.try_normalize().unwrap_or(DVec2::X), self.formula.slope(theta));
-            let tangential = self.formula.radius(theta) / r;
-            let meridional = slope * ray.z / n2;
-            let column = |axis: DVec2| axis * tangential + e * (e.dot(axis) * (meridional - tangential));
-            [column(DVec2::X), column(DVec2::Y), e * (-slope * r / n2)]
-        };
-        self.linear.map_or(columns, |[linear, _]| columns.map(|column| linear * column))
-    }
-
-    /// The unit ray of a distorted point; `None` beyond the largest angle.
-    pub fn ray(&self, distorted: DVec2) -> Option<DVec3> {
-        let distorted = self.without_linear(distorted);
-        let radius = distorted.length();
-        if !distorted.is_finite() || radius > self.formula.radius(self.angle_max) {
-            return None;
-        }
-        if radius < 1e-12 {
-            return Some((distorted / self.formula.slope(0.0)).extend(1.0));
-        }
-        let (sin, cos) = self.angle_of(radius, self.angle_max).sin_cos();
-        Some((distorted * (sin / radius)).extend(cos))
-    }
-
-    /// Whether a ray lies on the principal branch.
-    pub fn contains_ray(&self, ray: DVec3) -> bool {
-        ray.truncate().length().atan2(ray.z) < self.angle_max
-    }
-
     /// Whether there is no linear map of the image.
     pub(super) fn is_linear_identity(&self) -> bool {
         self.linear.is_none()
@@ -237,6 +139,119 @@ impl RadialLens {
             *(if self.formula.radius(middle) > radius { &mut high } else { &mut low }) = middle;
         }
         0.5 * (low + high)
+    }
+}
+
+impl LensClass for RadialLens {
+    fn model(&self) -> LensModel {
+        self.model
+    }
+
+    fn coefficients(&self) -> &[f64] {
+        &self.coefficients
+    }
+
+    fn distort(&self, ideal: DVec2) -> DVec2 {
+        distort(&*self.formula, self.linear.as_ref(), ideal)
+    }
+
+    /// `t I + (m - t) e e^T` with `e = (u, v)/r`, the tangential magnification `t = g(theta) / r` and the
+    /// meridional one `m = g'(theta) / (1 + r^2)`.
+    fn jacobian(&self, ideal: DVec2) -> DMat2 {
+        let r = ideal.length();
+        let jacobian = if r < ON_AXIS {
+            DMat2::IDENTITY * self.formula.slope(0.0)
+        } else {
+            let theta = r.atan();
+            let tangential = self.formula.radius(theta) / r;
+            let meridional = self.formula.slope(theta) / (1.0 + r * r);
+            let e = ideal / r;
+            let outer = DMat2::from_cols(e * e.x, e * e.y);
+            DMat2::IDENTITY * tangential + outer * (meridional - tangential)
+        };
+        self.linear.map_or(jacobian, |[linear, _]| linear * jacobian)
+    }
+
+    fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+        let distorted = self.without_linear(distorted);
+        let radius = distorted.length();
+        if !distorted.is_finite() || radius > self.formula.radius(self.theta_max) {
+            return None;
+        }
+        if radius < 1e-12 {
+            return Some(distorted / self.formula.slope(0.0));
+        }
+        Some(distorted * (self.angle_of(radius, self.theta_max).tan() / radius))
+    }
+
+    fn image(&self, ray: DVec3) -> DVec2 {
+        let across = ray.truncate();
+        let r = across.length();
+        let image = if r < ON_AXIS * ray.z {
+            across * (self.formula.slope(0.0) / ray.z)
+        } else {
+            // Straight behind, every direction of the image is as good.
+            let e = across.try_normalize().unwrap_or(DVec2::X);
+            e * self.formula.radius(r.atan2(ray.z))
+        };
+        self.linear.map_or(image, |[linear, _]| linear * image)
+    }
+
+    fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+        let (across, n2) = (ray.truncate(), ray.length_squared());
+        let r = across.length();
+        let columns = if r < ON_AXIS * ray.z {
+            let slope = self.formula.slope(0.0) / ray.z;
+            [DVec2::X * slope, DVec2::Y * slope, -across * (slope / ray.z)]
+        } else {
+            let theta = r.atan2(ray.z);
+            let (e, slope) = (across.try_normalize().unwrap_or(DVec2::X), self.formula.slope(theta));
+            let tangential = self.formula.radius(theta) / r;
+            let meridional = slope * ray.z / n2;
+            let column = |axis: DVec2| axis * tangential + e * (e.dot(axis) * (meridional - tangential));
+            [column(DVec2::X), column(DVec2::Y), e * (-slope * r / n2)]
+        };
+        self.linear.map_or(columns, |[linear, _]| columns.map(|column| linear * column))
+    }
+
+    fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+        let distorted = self.without_linear(distorted);
+        let radius = distorted.length();
+        if !distorted.is_finite() || radius > self.formula.radius(self.angle_max) {
+            return None;
+        }
+        if radius < 1e-12 {
+            return Some((distorted / self.formula.slope(0.0)).extend(1.0));
+        }
+        let (sin, cos) = self.angle_of(radius, self.angle_max).sin_cos();
+        Some((distorted * (sin / radius)).extend(cos))
+    }
+
+    fn contains_ray(&self, ray: DVec3) -> bool {
+        ray.truncate().length().atan2(ray.z) < self.angle_max
+    }
+
+    fn angle_max_rad(&self) -> f64 {
+        self.angle_max
+    }
+
+    fn axial_magnification(&self) -> f64 {
+        self.jacobian(DVec2::ZERO).determinant().abs().sqrt()
+    }
+
+    fn fold_curve(&self) -> Option<&FoldCurve> {
+        Some(&self.fold)
+    }
+
+    fn radial_table(&self) -> Option<&RadialTable> {
+        Some(&self.table)
+    }
+
+    fn distorted_max(&self) -> f64 {
+        match self.linear {
+            None => self.formula.radius(self.theta_max),
+            Some(_) => self.fold.distorted_max(),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::Lens;
+use super::{Lens, class::LensClass};
 
 /// Steps of the inverse; Newton's method needs some five.
 const MOST_STEPS: u32 = 100;
@@ -117,51 +117,55 @@ impl ScaledLens {
         &self.whole
     }
 
-    /// How much the image is scaled on the axis.
-    pub(super) fn axial_scale(&self) -> f64 {
-        self.scale.terms[0]
-    }
-
-    /// Bound on the distorted radius of the branch.
-    pub(super) fn distorted_max(&self) -> f64 {
-        // Both terms of the factor that grow are bounded where the branch ends.
-        let end = self.whole.distorted_max();
-        let r = (end * self.scale.unit.max_element()).min(self.scale.r_max);
-        if r.is_finite() { end * self.scale.terms[0].max(self.scale.factor(r)) } else { f64::INFINITY }
-    }
-
-    pub(super) fn distort(&self, ideal: DVec2) -> DVec2 {
-        self.scale.of(self.whole.distort(ideal))
-    }
-
-    pub(super) fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        self.scale.jacobian(self.whole.distort(ideal)) * self.whole.jacobian(ideal)
-    }
-
     /// A distorted point before its image is scaled; `None` for one that nothing is scaled to.
     pub(super) fn unscaled(&self, distorted: DVec2) -> Option<DVec2> {
         self.scale.undo(distorted)
     }
+}
 
-    pub(super) fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+impl LensClass for ScaledLens {
+    fn altered(&self) -> Option<&Lens> {
+        Some(&self.whole)
+    }
+
+    fn distort(&self, ideal: DVec2) -> DVec2 {
+        self.scale.of(self.whole.distort(ideal))
+    }
+
+    fn jacobian(&self, ideal: DVec2) -> DMat2 {
+        self.scale.jacobian(self.whole.distort(ideal)) * self.whole.jacobian(ideal)
+    }
+
+    fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         self.whole.undistort(self.unscaled(distorted)?)
     }
 
-    pub(super) fn image(&self, ray: DVec3) -> DVec2 {
+    fn image(&self, ray: DVec3) -> DVec2 {
         self.scale.of(self.whole.image(ray))
     }
 
-    pub(super) fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
+    fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
         let scale = self.scale.jacobian(self.whole.image(ray));
         self.whole.gradient(ray).map(|column| scale * column)
     }
 
-    pub(super) fn ray(&self, distorted: DVec2) -> Option<DVec3> {
+    fn ray(&self, distorted: DVec2) -> Option<DVec3> {
         self.whole.ray(self.unscaled(distorted)?)
     }
 
-    pub(super) fn contains_ray(&self, ray: DVec3) -> bool {
+    fn contains_ray(&self, ray: DVec3) -> bool {
         self.whole.contains_ray(ray) && self.scale.contains(self.whole.image(ray))
+    }
+
+    fn axial_magnification(&self) -> f64 {
+        self.scale.terms[0] * self.whole.axial_magnification()
+    }
+
+    fn distorted_max(&self) -> f64 {
+        // Both terms of the factor that grow are bounded where the branch ends.
+        let end = self.whole.distorted_max();
+        let r = (end * self.scale.unit.max_element()).min(self.scale.r_max);
+        if r.is_finite() { end * self.scale.terms[0].max(self.scale.factor(r)) } else { f64::INFINITY }
     }
 }
 

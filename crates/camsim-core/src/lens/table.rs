@@ -13,11 +13,11 @@ use super::fold::MAX_FIELD_RAD;
 use super::spline::{LEAST_NODES, Spline};
 
 pub(super) const FACTS: ModelFacts = ModelFacts {
-    name: "table",
-    coefficients: &[],
-    defaults: &[],
     fix: "leave them out: the points are those of camera.lens_table",
     shape: |_| Shape::Table,
+    point: "the spline through the points of `camera.lens_table`",
+    field: "360",
+    ..ModelFacts::NONE
 };
 
 /// How far outside of its grid a point still belongs to it, in nodes: rounding.

@@ -1,55 +1,12 @@
 //! Checks of the coefficients of a lens.
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::ops::RangeBounds;
 
 use super::Check;
 use crate::{lens::ModelFacts, scenario::LensModel};
 
 /// Polynomials of pixels have a first term of hundreds, those of the focal length one of about 1.
 const PIXELS_FROM: f64 = 30.0;
-
-/// The values that a model is defined for.
-struct Range {
-    model: LensModel,
-    /// Position from 0.
-    index: usize,
-    /// Both are legal where `is_open` is false.
-    least: f64,
-    most: f64,
-    is_open: bool,
-    /// The range in words, and a hint.
-    text: &'static str,
-}
-
-const fn range(model: LensModel, index: usize, [least, most]: [f64; 2], text: &'static str) -> Range {
-    Range { model, index, least, most, is_open: false, text }
-}
-
-const fn open(range: Range) -> Range {
-    Range { is_open: true, ..range }
-}
-
-/// The domains of the papers; of `division` and of a tilt, far more than any lens has.
-const RANGES: [Range; 10] = [
-    range(LensModel::Eucm, 0, [0.0, 1.0], "0 to 1"),
-    open(range(LensModel::Eucm, 1, [0.0, f64::INFINITY], "above 0")),
-    open(range(LensModel::DoubleSphere, 0, [-1.0, f64::INFINITY], "above -1")),
-    range(LensModel::DoubleSphere, 1, [0.0, 1.0], "0 to 1; the order is xi alpha"),
-    range(LensModel::Ucm, 0, [0.0, 1.0], "0 to 1; xi of model \"mei\" is alpha / (1 - alpha)"),
-    open(range(LensModel::Mei, 0, [-1.0, f64::INFINITY], "above -1; a pinhole has 0")),
-    open(range(LensModel::Fov, 0, [-PI, PI], "below pi: it is the field of view in radians")),
-    range(
-        LensModel::Division,
-        0,
-        [-100.0, 100.0],
-        "-100 to 100: it belongs to radii in units of the focal length; multiply the k of pixels by the square of \
-         focal_px, HALCON's kappa by that of its focus",
-    ),
-    range(LensModel::BrownConradyPrism, 12, [-FRAC_PI_4, FRAC_PI_4], TILT),
-    range(LensModel::BrownConradyPrism, 13, [-FRAC_PI_4, FRAC_PI_4], TILT),
-];
-
-const TILT: &str = "-pi/4 to pi/4: a tilt is in radians";
 
 /// Checks number, order and ranges: one problem of a list.
 pub(super) fn check_coefficients(
@@ -75,7 +32,7 @@ fn check_count(check: &mut Check, key: &str, model: LensModel, coefficients: &[f
     let order = format!("the order is {}", facts.order());
     let values = if given == 1 { "value" } else { "values" };
     check.require(given <= most, key, || match most {
-        0 => format!("has {given} {values}, but model \"{}\" takes none; {}", facts.name, facts.fix),
+        0 => format!("has {given} {values}, but model \"{}\" takes none; {}", model.name(), facts.fix),
         _ => format!("has {given} {values} where at most {most} fit; {order}; {}", facts.fix),
     });
     // Three coefficients are what other programs call k1 k2 k3.
@@ -90,14 +47,10 @@ fn check_count(check: &mut Check, key: &str, model: LensModel, coefficients: &[f
 
 /// The first coefficient that the model is not defined for.
 fn out_of_range(model: LensModel, coefficients: &[f64]) -> Option<String> {
-    RANGES.iter().filter(|range| range.model == model).find_map(|range| {
-        let value = *coefficients.get(range.index)?;
-        let fits = match range.is_open {
-            true => range.least < value && value < range.most,
-            false => (range.least..=range.most).contains(&value),
-        };
-        let name = ModelFacts::of(model).coefficients.get(range.index)?;
-        (!fits).then(|| format!("has {name} = {value}; {name} must be {}", range.text))
+    let facts = ModelFacts::of(model);
+    facts.ranges.iter().find_map(|(name, range, text)| {
+        let value = coefficients.get(facts.coefficients.iter().position(|known| known == name)?)?;
+        (!range.contains(value)).then(|| format!("has {name} = {value}; {name} must be {text}"))
     })
 }
 
@@ -191,9 +144,9 @@ mod tests {
             for line in table.lines().skip(1) {
                 let cells: Vec<&str> = line.split(',').collect();
                 let number = |text: &str| text.parse::<f64>().expect(line);
-                let model = LensModel::ALL.iter().find(|model| ModelFacts::of(**model).name == cells[1]);
+                let model = LensModel::named(cells[1]);
                 let lens = LensSpec {
-                    model: *model.expect(line),
+                    model: model.expect(line),
                     coefficients: cells[8].split_whitespace().map(number).collect(),
                 };
                 let focal_px = [number(cells[4]), number(cells[5])];

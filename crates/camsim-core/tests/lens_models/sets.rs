@@ -1,7 +1,7 @@
 //! Cameras with lenses: published and made (tests/data/lens_models.csv), and hostile ones.
 
+use camsim_core::camera::CameraModel;
 use camsim_core::lens::LensModel;
-use camsim_core::{camera::CameraModel, lens::ModelFacts};
 
 pub struct Set {
     pub name: String,
@@ -43,7 +43,7 @@ pub fn hostile_sets() -> Vec<Set> {
             let focal = [290.0 + 200.0 * random(), 290.0 + 200.0 * random()];
             let centre = [320.0 + 120.0 * random(), 240.0 + 90.0 * random()];
             let camera = CameraModel::new([640, 480], focal, Some(centre), *model, &k).unwrap();
-            sets.push(Set { name: format!("{} {i} {k:?}", ModelFacts::of(*model).name), camera });
+            sets.push(Set { name: format!("{} {i} {k:?}", model.name()), camera });
         }
     }
     sets

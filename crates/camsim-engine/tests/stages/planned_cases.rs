@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use camsim_core::{
-    lens::ModelFacts,
     scenario::{
         Auto, Axis, FieldOr, LensModel, LensSpec, MountSpec, OutputEncoding, Readout, Scenario, Silhouettes,
         VibrationSpec,
@@ -95,7 +94,7 @@ pub fn lenses() -> Vec<Case> {
         scenario.camera.focal_px = [focal_px, 0.95 * focal_px];
         scenario.camera.lens = LensSpec { model, coefficients: coefficients.to_vec() };
         let sequence = sequence(scenario, turning(), pattern(6000.0));
-        let name = format!("lens of model {}", ModelFacts::of(model).name);
+        let name = format!("lens of model {}", model.name());
         let case = Case::new(name, sequence, Input::Frame(2), Output::FrameAndColorAlone);
         Case { coords_phase: COORDS_PHASE, ..case }
     };

@@ -1,6 +1,6 @@
 //! Names and orders of lens models in formats that have a name and a list of numbers.
 
-use camsim_core::{lens::ModelFacts, scenario::LensModel};
+use camsim_core::scenario::LensModel;
 
 use super::{Calibration, CalibrationError};
 
@@ -84,7 +84,7 @@ const TWIN_ADVICE: &str = "render the scenario without this export and with `[[o
 pub(crate) fn no_such_lens(camera: &Calibration, format: &str) -> CalibrationError {
     let reason = match camera.intrinsics.model {
         LensModel::Pinhole | LensModel::BrownConrady => "lens with this many coefficients".to_owned(),
-        model => format!("lens of the model {}", ModelFacts::of(model).name),
+        model => format!("lens of the model {}", model.name()),
     };
     CalibrationError::Refused(format!(
         "{}: {format} has no {reason} ({:?}): `camsim camera export --as stmap` writes any lens, and a twin without lens \

@@ -86,7 +86,7 @@ fn coefficients_warning(camera: &CameraSpec) -> Option<String> {
     (coefficients.is_empty() && camera.zoom.is_empty() && !facts.coefficients.is_empty()).then(|| {
         format!(
             "camera.lens.coefficients is empty: {} has its default values of {}, which are no lens that was measured",
-            facts.name,
+            model.name(),
             facts.coefficients.join(" ")
         )
     })

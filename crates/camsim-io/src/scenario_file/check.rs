@@ -1,6 +1,6 @@
 //! Checks keys and types against the schema, and resolves paths.
 
-use camsim_core::{lens::ModelFacts, lens::foreign_model};
+use camsim_core::lens::foreign_model;
 use toml::{Table, Value};
 
 use super::{
@@ -250,8 +250,7 @@ fn has_too_large(value: &Value) -> bool {
 /// The word that was probably meant: of a lens model the one that other programs call so, else the most similar.
 fn meant_word<'a>(key: &str, word: &str, words: &[&'a str]) -> Option<&'a str> {
     let foreign = foreign_model(word).filter(|_| key.ends_with("lens.model"));
-    let known =
-        foreign.and_then(|model| words.iter().copied().find(|known| *known == ModelFacts::of(model).name));
+    let known = foreign.and_then(|model| words.iter().copied().find(|known| *known == model.name()));
     known.or_else(|| similar::nearest_word(word, words))
 }
 

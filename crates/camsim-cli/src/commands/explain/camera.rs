@@ -3,7 +3,6 @@
 use camsim_core::{
     camera::CameraModel,
     imaging::{SensorLevels, sensor_levels},
-    lens::ModelFacts,
     scenario::CameraSpec,
 };
 use serde::Serialize;
@@ -37,7 +36,7 @@ pub(super) fn facts(spec: &CameraSpec, zoom: Option<f64>) -> Result<CameraFacts<
     Ok(CameraFacts {
         name: &spec.name,
         size_px: model.size_px,
-        lens: ModelFacts::of(spec.lens.model).name,
+        lens: spec.lens.model.name(),
         focal_px: model.focal_px.to_array(),
         field_deg: model.field_deg(),
         sensor: sensor_levels(spec),

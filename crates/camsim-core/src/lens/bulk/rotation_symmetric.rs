@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{BLOCK, Block, polynomials::Polynomials};
 use crate::lens::RadialLens;
+use crate::lens::class::LensClass;
 
 /// Largest residual of a tabulated angle, relative to the distorted radius.
 const MAX_RESIDUAL: f64 = 1.5e-15;
