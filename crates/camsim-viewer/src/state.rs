@@ -50,6 +50,7 @@ pub struct StatusMessage {
 }
 
 /// The window's state.
+#[derive(Default)]
 pub struct State {
     /// The scenario, if one is open.
     pub document: Option<Document>,
@@ -93,27 +94,7 @@ pub struct State {
 impl State {
     /// A state without open scenario.
     pub fn new(settings: Settings, exporter: Option<Exporter>) -> Self {
-        Self {
-            document: None,
-            timeline: Timeline::default(),
-            view: settings.view,
-            engine: EngineState::default(),
-            notices: Vec::new(),
-            status: None,
-            rejected_input: None,
-            hovered: None,
-            pinned: None,
-            shows_shortcuts: false,
-            path_prompt: None,
-            dropped_picture: None,
-            unsaved_prompt: None,
-            export: None,
-            recent: settings.recent,
-            file_dialog: None,
-            exporter,
-            now_s: 0.0,
-            last_input_s: 0.0,
-        }
+        Self { view: settings.view, recent: settings.recent, exporter, ..Self::default() }
     }
 
     /// The settings to store for the next run.

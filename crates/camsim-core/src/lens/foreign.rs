@@ -1,6 +1,6 @@
 //! Lens models by the names that calibration files and other programs give them.
 
-use super::LensModel;
+use super::{LensModel, ModelFacts};
 
 /// A lens as a file names it, in camsim's terms.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,10 +2,7 @@
 
 use eframe::egui;
 
-use super::{
-    tooltips::WithTooltip,
-    widgets::{named, waiting},
-};
+use super::widgets::{small_button, waiting};
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -22,9 +19,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     for (index, notice) in state.notices.iter().enumerate() {
         ui.horizontal(|ui| {
             let name = format!("dismiss: {notice}");
-            let dismiss = ui.small_button("x").with_tooltip(&name);
-            named(&dismiss, egui::Role::Button, &name);
-            if dismiss.clicked() {
+            if small_button(ui, "x", &name, &name) {
                 out.push(Message::Dismiss(index));
             }
             line(ui, notice, false);

@@ -8,11 +8,11 @@ use std::sync::LazyLock;
 
 use camsim_core::scenario::keys::Key;
 use camsim_io::scenario_file::{ValueKind, keys};
-use eframe::egui::{self, RichText, Role, Ui};
+use eframe::egui::{self, RichText, Ui};
 
 use super::{
     tooltips::{TooltipPlacement, WithTooltip},
-    widgets::named,
+    widgets::small_button,
 };
 use crate::{
     document::Document,
@@ -130,10 +130,8 @@ fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, facts: &Key, 
         }
         if changed {
             let name = format!("reset {key}");
-            let reset =
-                ui.small_button("reset").with_tooltip(format!("{name} to {}", opened_text(document, key)));
-            named(&reset, Role::Button, &name);
-            if reset.clicked() {
+            let tip = format!("{name} to {}", opened_text(document, key));
+            if small_button(ui, "reset", &name, &tip) {
                 out.push(Message::Reset(key.to_owned()));
             }
         }

@@ -1,15 +1,13 @@
 //! The timeline: play, scrubbing, loop, and the exposure times of the frame's rows.
 
-use std::sync::Arc;
-
-use camsim_core::{sequence::Sequence, shutter::Shutter};
+use camsim_core::shutter::Shutter;
 use camsim_io::load::Loaded;
-use eframe::egui::{self, Color32, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use eframe::egui::{self, Color32, Rect, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use super::{
     number_field::{self, NumberField},
     tooltips::{TooltipPlacement, WithTooltip},
-    widgets::{fixed, named, signed},
+    widgets::{button, fixed, signed},
 };
 use crate::{
     message::{Message, Outbox},
@@ -37,9 +35,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let timeline = &state.timeline;
     let mut button = |ui: &mut Ui, text: &str, name: &str, message: Message| {
-        let response = ui.button(text).with_tooltip(name);
-        named(&response, Role::Button, name);
-        if response.clicked() {
+        if button(ui, text, name, name) {
             out.push(message);
         }
     };
@@ -160,33 +156,30 @@ fn scrub_bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
     response.with_tooltip_ui(|ui| log_report(ui, state));
 }
 
+/// Path times of the log on the timeline, in frames.
+fn in_frames(loaded: &Loaded) -> impl Fn(f64) -> f64 {
+    let sequence = &loaded.sequence;
+    let (start_s, fps) = (sequence.start_s, sequence.scenario.camera.fps);
+    move |t_s| (t_s - start_s) * fps
+}
+
 /// Gaps of the log on the timeline, in frames, in order.
 fn gaps(state: &State) -> impl Iterator<Item = [f64; 2]> + '_ {
     let last = state.timeline.last() as f64;
-    let in_frames = |sequence: &'_ Arc<Sequence>| {
-        let sequence = sequence.clone();
-        move |span: &[f64; 2]| span.map(|t_s| (t_s - sequence.start_s) * sequence.scenario.camera.fps)
-    };
-    let spans = state
-        .engine
-        .sequence()
-        .into_iter()
-        .flat_map(move |sequence| state.engine.gaps_s.iter().map(in_frames(sequence)));
+    let spans = state.engine.loaded.iter().flat_map(|loaded| {
+        let frame = in_frames(loaded);
+        state.engine.gaps_s.iter().map(move |span| span.map(&frame))
+    });
     spans.filter(move |[from, to]| *to >= 0.0 && *from <= last)
 }
 
 /// Frames of repaired rows of the log, in order.
 fn repaired(state: &State) -> impl Iterator<Item = f64> + '_ {
     let last = state.timeline.last() as f64;
-    let in_frames = |loaded: &'_ Arc<Loaded>| {
-        let sequence = loaded.sequence.clone();
-        move |t_s: &f64| (t_s - sequence.start_s) * sequence.scenario.camera.fps
-    };
-    let frames = state
-        .engine
-        .loaded
-        .iter()
-        .flat_map(move |loaded| loaded.log.report.repaired_s.iter().map(in_frames(loaded)));
+    let frames = state.engine.loaded.iter().flat_map(|loaded| {
+        let frame = in_frames(loaded);
+        loaded.log.report.repaired_s.iter().map(move |t_s| frame(*t_s))
+    });
     frames.filter(move |frame| (0.0..=last).contains(frame))
 }
 

@@ -22,7 +22,7 @@ use super::{
     map::static_map::{self, StaticMap},
     number_field::{self, NumberField},
     tooltips::WithTooltip,
-    widgets::{fact, facts, fixed, named},
+    widgets::{fact, facts, fixed, small_button},
 };
 use crate::{
     message::{Message, Outbox},
@@ -104,9 +104,7 @@ fn controls(ui: &mut Ui, orbit: &mut Orbit, sphere: BoundingSphere, camera_ned_m
             *orbit = orbit.centred(camera_ned_m, sphere);
         }
         for (text, name, factor) in [("-", "farther", 1.0 / 1.5), ("+", "nearer", 1.5)] {
-            let button = ui.small_button(text).with_tooltip(name);
-            named(&button, Role::Button, name);
-            if button.clicked() {
+            if small_button(ui, text, name, name) {
                 *orbit = orbit.zoomed(factor);
             }
         }

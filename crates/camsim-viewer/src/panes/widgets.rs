@@ -42,6 +42,22 @@ pub fn named(response: &Response, kind: Role, name: &str) {
     response.widget_info(|| WidgetInfo::labeled(kind, response.enabled(), name));
 }
 
+/// A button; `name` is for assistive technology. Returns whether it was clicked.
+pub fn button(ui: &mut Ui, text: &str, name: &str, tooltip: &str) -> bool {
+    clicked(ui.button(text), name, tooltip)
+}
+
+/// As [`button`], a small one.
+pub fn small_button(ui: &mut Ui, text: &str, name: &str, tooltip: &str) -> bool {
+    clicked(ui.small_button(text), name, tooltip)
+}
+
+fn clicked(button: Response, name: &str, tooltip: &str) -> bool {
+    let button = button.with_tooltip(tooltip);
+    named(&button, Role::Button, name);
+    button.clicked()
+}
+
 /// A row of a table: label and value, which can be selected and copied.
 pub fn fact(ui: &mut Ui, label: &str, value: impl Into<String>, tooltip: &str) {
     ui.label(egui::RichText::new(label).weak()).with_tooltip(tooltip);

@@ -115,44 +115,31 @@ fn floats(values: [f64; 3]) -> Value {
 /// its pose.
 fn add_target(state: &mut State, path: &Path) {
     let pinned_ned_m = pinned_point_ned_m(state);
-    let outcome = match &mut state.document {
-        Some(document) => std::path::absolute(path)
-            .map_err(|error| format!("{}: {error}", path.display()))
-            .and_then(|file| {
-                let position = pinned_ned_m.filter(|_| document.value("scene.board").is_none());
-                let mut board =
-                    document.value("scene.board").and_then(Value::as_table).cloned().unwrap_or_default();
-                board.retain(|key, _| BOARD_POSE_KEYS.contains(&key));
-                if let Some(point) = position {
-                    board.insert("at".into(), floats(point));
-                }
-                board.insert("target".into(), Value::String(file.display().to_string()));
-                try_set(document, "scene.board", Value::Table(board), path)
-            }),
-        None => Err(no_scenario(path)),
-    };
-    finish(state, outcome);
+    use_file(state, "scene.board", path, |document, file| {
+        let present = document.value("scene.board").and_then(Value::as_table);
+        let position = pinned_ned_m.filter(|_| document.value("scene.board").is_none());
+        let mut board = present.cloned().unwrap_or_default();
+        board.retain(|key, _| BOARD_POSE_KEYS.contains(&key));
+        if let Some(point) = position {
+            board.insert("at".into(), floats(point));
+        }
+        board.insert("target".into(), file);
+        Value::Table(board)
+    });
 }
 
 /// Adds a model at the point that the pinned pixel sees, or at the origin; on the ground if there is terrain.
 fn add_model(state: &mut State, path: &Path) {
     let position_ned_m = pinned_point_ned_m(state).unwrap_or_default();
-    let outcome = match &mut state.document {
-        Some(document) => std::path::absolute(path)
-            .map_err(|error| format!("{}: {error}", path.display()))
-            .and_then(|file| {
-                let mut entry = Table::new();
-                entry.insert("file".into(), Value::String(file.display().to_string()));
-                entry.insert("at".into(), floats(position_ned_m));
-                entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
-                let mut list =
-                    document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();
-                list.push(Value::Table(entry));
-                try_set(document, "scene.gltf", Value::Array(list), path)
-            }),
-        None => Err(no_scenario(path)),
-    };
-    finish(state, outcome);
+    use_file(state, "scene.gltf", path, |document, file| {
+        let mut entry = Table::new();
+        entry.insert("file".into(), file);
+        entry.insert("at".into(), floats(position_ned_m));
+        entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
+        let mut list = document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();
+        list.push(Value::Table(entry));
+        Value::Array(list)
+    });
 }
 
 /// Imports another program's calibration. Shutter and photometry stay if the file has none, but for the
@@ -195,10 +182,16 @@ fn set_camera(state: &mut State, read: Result<CameraSpec, String>) {
 
 /// Sets `key` to a dropped file.
 fn set_path(state: &mut State, key: &str, path: &Path) {
+    use_file(state, key, path, |_, file| file);
+}
+
+/// Sets `key` to a value that is made from the absolute path of a dropped file.
+fn use_file(state: &mut State, key: &str, path: &Path, value: impl FnOnce(&Document, Value) -> Value) {
     let absolute = std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()));
     let outcome = match (&mut state.document, absolute) {
-        (Some(document), Ok(absolute)) => {
-            try_set(document, key, Value::String(absolute.display().to_string()), path)
+        (Some(document), Ok(file)) => {
+            let value = value(document, Value::String(file.display().to_string()));
+            try_set(document, key, value, path)
         }
         (Some(_), Err(error)) => Err(error),
         (None, _) => Err(no_scenario(path)),

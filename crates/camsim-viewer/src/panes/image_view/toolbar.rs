@@ -9,7 +9,7 @@ use crate::{
     panes::{
         number_field::{self, NumberField},
         tooltips::{TooltipPlacement, WithTooltip},
-        widgets::{choice, named},
+        widgets::{choice, named, small_button},
     },
     state::State,
     view::{Compare, View},
@@ -122,9 +122,7 @@ fn zoom(ui: &mut Ui, view: &mut View) {
         *view = viewport::zoomed_about_middle(view, 1.0, 1.0);
     }
     for (text, name, factor) in [("-", "zoom out", 0.5), ("+", "zoom in", 2.0)] {
-        let button = ui.small_button(text).with_tooltip(name);
-        named(&button, Role::Button, name);
-        if button.clicked() {
+        if small_button(ui, text, name, name) {
             *view = viewport::zoomed_about_middle(view, current, factor);
         }
     }

@@ -1,10 +1,10 @@
 //! Editors of lists of tables: vibration, zoom calibrations, models, twins, sensors.
 
 use camsim_io::scenario_file::{ValueKind, find_key, keys};
-use eframe::egui::{Role, Ui};
+use eframe::egui::Ui;
 use toml::{Table, Value};
 
-use super::super::{tooltips::WithTooltip, widgets::named};
+use super::super::{tooltips::WithTooltip, widgets::small_button};
 use super::row;
 use crate::{
     document::Document,
@@ -20,9 +20,7 @@ pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mu
         ui.horizontal(|ui| {
             ui.label(format!("{leaf} {}", index + 1));
             let name = format!("remove {key} {}", index + 1);
-            let remove = ui.small_button("x").with_tooltip(&name);
-            named(&remove, Role::Button, &name);
-            if remove.clicked() {
+            if small_button(ui, "x", &name, &name) {
                 out.push(Message::Set(format!("{key}.{index}"), None, false));
             }
         });
