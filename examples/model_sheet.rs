@@ -108,11 +108,8 @@ fn portrait(engine: &Engine, model: &Model) -> Result<RenderedFrame, Box<dyn Err
     let ned_from_body = DQuat::from_euler(EulerRot::ZYX, yaw, pitch, 0.0);
     let state = BodyState {
         position_ned_m: centre - AWAY * (ned_from_body * DVec3::X),
-        velocity_ned_m_s: DVec3::ZERO,
-        acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body,
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let sequence = sequence(state, Scene { meshes, sky_linear: SKY, ..Scene::default() })?;
     let mut rendered = RenderedFrame::default();
@@ -158,15 +155,5 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
         Trajectory::uniform(-1.0, 2.0, 1.0, vec![state]).ok_or("no trajectory")?,
         &scenario.camera.mount,
     )?;
-    Ok(Arc::new(Sequence {
-        scenario,
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 1,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    }))
+    Ok(Arc::new(Sequence::in_memory(scenario, path, scene, 1)))
 }

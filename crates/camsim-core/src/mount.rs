@@ -225,10 +225,9 @@ mod tests {
         let state = BodyState {
             position_ned_m: DVec3::new(100.0, 200.0, -300.0),
             velocity_ned_m_s,
-            acceleration_ned_m_s2: DVec3::ZERO,
             ned_from_body,
             rate_body_rad_s,
-            angular_acceleration_body_rad_s2: DVec3::ZERO,
+            ..BodyState::default()
         };
         Trajectory::uniform(0.0, 10.0, 10.0, vec![state]).unwrap()
     }

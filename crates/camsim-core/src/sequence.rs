@@ -41,6 +41,22 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// A sequence in memory, whose frame 0 begins at path time 0; without vignette, zoom and exposure control.
+    #[must_use]
+    pub fn in_memory(scenario: Scenario, path: CameraPath, scene: Scene, frames: u64) -> Self {
+        Self {
+            scenario,
+            path: Arc::new(path),
+            epoch_ns: 0,
+            start_s: 0.0,
+            frames,
+            scene: Arc::new(scene),
+            vignette: None,
+            zoom_track: Vec::new(),
+            exposures: None,
+        }
+    }
+
     /// The sequence of a twin's pictures, as [`scenario_of`]: of the same path and scene, with the same
     /// frame numbers.
     ///

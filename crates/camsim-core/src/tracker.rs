@@ -407,10 +407,9 @@ fn piecewise(rows: &[LogRow], velocities: impl Fn(&LogRow, &LogRow) -> (DVec3, D
         BodyState {
             position_ned_m: row.position_ned_m,
             velocity_ned_m_s: motion.0,
-            acceleration_ned_m_s2: DVec3::ZERO,
             ned_from_body: row.ned_from_body,
             rate_body_rad_s: motion.1,
-            angular_acceleration_body_rad_s2: DVec3::ZERO,
+            ..BodyState::default()
         }
     });
     let knots = knots.collect();

@@ -299,7 +299,6 @@ fn is_finite(state: &BodyState) -> bool {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use glam::DQuat;
 
     use super::*;
 
@@ -473,11 +472,7 @@ mod tests {
         let knots: Vec<_> = (0..4)
             .map(|k| BodyState {
                 position_ned_m: DVec3::splat(f64::from(k)),
-                velocity_ned_m_s: DVec3::ZERO,
-                acceleration_ned_m_s2: DVec3::ZERO,
-                ned_from_body: DQuat::IDENTITY,
-                rate_body_rad_s: DVec3::ZERO,
-                angular_acceleration_body_rad_s2: DVec3::ZERO,
+                ..BodyState::default()
             })
             .collect();
         let trajectory = Trajectory::listed(times.clone(), 4.0, knots.clone()).unwrap();

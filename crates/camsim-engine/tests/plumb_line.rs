@@ -81,17 +81,8 @@ fn measured_and_expected(log: &Path, t_s: f64) -> (f64, f64) {
     let with_readout = |readout_ms: f64| {
         let mut scenario = scenario.clone();
         scenario.camera.shutter = ShutterSpec { readout_ms, ..ShutterSpec::default() };
-        let sequence = Sequence {
-            scenario,
-            path: Arc::new(path.clone()),
-            epoch_ns: 0,
-            start_s: t_s,
-            frames: 1,
-            scene: Arc::new(scene.clone()),
-            vignette: None,
-            zoom_track: Vec::new(),
-            exposures: None,
-        };
+        let sequence =
+            Sequence { start_s: t_s, ..Sequence::in_memory(scenario, path.clone(), scene.clone(), 1) };
         let done = render(&engine, &Arc::new(sequence), &[Channel::Color], 0);
         let points = line_columns(&done.frame.color_rgba, done.frame.size_px);
         assert!(points.len() > 200, "the line crosses the image: {} rows", points.len());

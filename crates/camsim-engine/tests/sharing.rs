@@ -16,7 +16,7 @@ use camsim_core::{
 use camsim_engine::{Engine, Finished};
 use camsim_plan::{FramePlan, PlanError, Planner, TemporalStage};
 use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 const ALL: [Channel; 3] = [Channel::Color, Channel::Coords, Channel::Depth];
 /// Two groups of eight.
@@ -201,12 +201,9 @@ fn error_of_one_frame_does_not_affect_others() {
     let mut spun = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 8));
     let knot = |k: i32| BodyState {
         position_ned_m: DVec3::new(0.0, 0.0, -80.0),
-        velocity_ned_m_s: DVec3::ZERO,
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
         // About frame 4, from half a period before its stamp on.
         rate_body_rad_s: DVec3::Z * if k == 8 { 20.0 } else { 0.0 },
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory =
         Trajectory::uniform(-0.5 / 30.0, 1.0 / 30.0, 1.0, (4..36).map(knot).collect()).expect("knots");

@@ -199,10 +199,9 @@ fn moved(at_ned_m: DVec3, at_s: f64) -> Trajectory {
     let first = BodyState {
         position_ned_m: at_ned_m + DVec3::new(-25.0, -60.0, -120.0),
         velocity_ned_m_s: DVec3::new(25.0, 60.0, 0.0),
-        acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body: DQuat::from_euler(EulerRot::ZYX, 0.3, 0.1, -0.1),
         rate_body_rad_s: DVec3::new(0.2, -0.3, 0.9),
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     Trajectory::uniform(at_s - 1.0, 4.0, at_s + 3.0, vec![first]).expect("one segment")
 }

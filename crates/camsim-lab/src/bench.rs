@@ -93,7 +93,7 @@ pub struct Options<'a> {
 }
 
 /// Results of a benchmark.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct BenchReport {
     /// camsim's version.
     pub version: &'static str,
@@ -149,12 +149,8 @@ pub fn run<E: From<BenchError>>(
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
         quick: options.quick,
         cases: [0, chosen.len()],
-        rows: Vec::new(),
-        ablation: Vec::new(),
-        violations: Vec::new(),
-        refused: Vec::new(),
         about: chosen.iter().map(|case| (case.name.to_owned(), case.about)).collect(),
-        elapsed_s: 0.0,
+        ..BenchReport::default()
     };
     let limits = round_limits(options.quick);
     let total_cost =

@@ -169,11 +169,10 @@ impl ConstantTwist {
         let first = BodyState {
             position_ned_m: DVec3::new(0.0, 0.0, -self.height_m) - SPAN_S * velocity_ned_m_s,
             velocity_ned_m_s,
-            acceleration_ned_m_s2: DVec3::ZERO,
             ned_from_body: (attitude_at_zero * DQuat::from_scaled_axis(-SPAN_S * rate_body_rad_s))
                 .normalize(),
             rate_body_rad_s,
-            angular_acceleration_body_rad_s2: DVec3::ZERO,
+            ..BodyState::default()
         };
         Trajectory::uniform(-SPAN_S, 2.0 * SPAN_S, SPAN_S, vec![first])
     }
@@ -187,17 +186,7 @@ pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Res
     let path = CameraPath::new(trajectory, &camera.mount)?;
     let scenario =
         Scenario { seed: SEED, camera, ..Scenario::new(FlightSpec::new("in-memory"), SceneSpec::default()) };
-    Ok(Sequence {
-        scenario,
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: FRAMES,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    })
+    Ok(Sequence::in_memory(scenario, path, scene, FRAMES))
 }
 
 #[cfg(test)]

@@ -18,6 +18,18 @@ pub struct Series {
     pub joined: bool,
 }
 
+impl Series {
+    /// Points that are joined by a line.
+    pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), points, joined: true }
+    }
+
+    /// Single points.
+    pub fn dots(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self { joined: false, ..Self::line(name, points) }
+    }
+}
+
 /// A plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
@@ -204,7 +216,7 @@ mod tests {
     use super::*;
 
     fn plot(points: Vec<(f64, f64)>, log: [bool; 2]) -> Plot {
-        let series = vec![Series { name: "curve <1>".into(), points, joined: true }];
+        let series = vec![Series::line("curve <1>", points)];
         Plot { title: "t".into(), x_label: "x".into(), y_label: "y".into(), log, series }
     }
 

@@ -37,6 +37,8 @@ mod tracking;
 pub use report::{ExperimentReport, Picture};
 pub use table::{Table, short};
 
+type Run = fn(&Setup<'_>) -> Result<ExperimentReport, ReproduceError>;
+
 /// An experiment of section 8.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Experiment {
@@ -71,34 +73,30 @@ impl Experiment {
         Self::Speed,
     ];
 
+    /// Name; section and figures of the paper, and the subject; the experiment itself.
+    fn facts(self) -> (&'static str, &'static str, Run) {
+        match self {
+            Self::Tracking => ("tracking", "8.1, table 1: tracking of the flight log", tracking::run),
+            Self::Lens => ("lens", "8.3, figs. 11 and 12: the lens model", lens::run),
+            Self::Time => ("time", "8.4, figs. 13 to 15: the time displacement model", time::run),
+            Self::Blur => ("blur", "8.5, figs. 16 and 17: motion blur", blur::run),
+            Self::Shutter => ("shutter", "8.6, figs. 18 and 19: rolling shutter", shutter::run),
+            Self::Interlace => ("interlace", "8.7, fig. 20: interlacing", interlace::run),
+            Self::Map => ("map", "8.8, fig. 21: time displacement on a map", map::run),
+            Self::Speed => ("speed", "8.9: speed", speed::run),
+        }
+    }
+
     /// Name on the command line and of the output folder.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Tracking => "tracking",
-            Self::Lens => "lens",
-            Self::Time => "time",
-            Self::Blur => "blur",
-            Self::Shutter => "shutter",
-            Self::Interlace => "interlace",
-            Self::Map => "map",
-            Self::Speed => "speed",
-        }
+        self.facts().0
     }
 
     /// Section and figures of the paper, and the subject.
     #[must_use]
     pub fn title(self) -> &'static str {
-        match self {
-            Self::Tracking => "8.1, table 1: tracking of the flight log",
-            Self::Lens => "8.3, figs. 11 and 12: the lens model",
-            Self::Time => "8.4, figs. 13 to 15: the time displacement model",
-            Self::Blur => "8.5, figs. 16 and 17: motion blur",
-            Self::Shutter => "8.6, figs. 18 and 19: rolling shutter",
-            Self::Interlace => "8.7, fig. 20: interlacing",
-            Self::Map => "8.8, fig. 21: time displacement on a map",
-            Self::Speed => "8.9: speed",
-        }
+        self.facts().1
     }
 
     /// Runs the experiment.
@@ -106,16 +104,7 @@ impl Experiment {
     /// # Errors
     /// [`ReproduceError`].
     pub fn run(self, setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError> {
-        match self {
-            Self::Tracking => tracking::run(setup),
-            Self::Lens => lens::run(setup),
-            Self::Time => time::run(setup),
-            Self::Blur => blur::run(setup),
-            Self::Shutter => shutter::run(setup),
-            Self::Interlace => interlace::run(setup),
-            Self::Map => map::run(setup),
-            Self::Speed => speed::run(setup),
-        }
+        self.facts().2(setup)
     }
 }
 

@@ -60,23 +60,14 @@ fn sequence_of(scenario: Scenario, vignette: Option<GrayImage>) -> Arc<Sequence>
     let first = BodyState {
         position_ned_m: DVec3::new(0.0, -3.0 * SPEED_M_S, -150.0),
         velocity_ned_m_s: DVec3::new(0.0, SPEED_M_S, 0.0),
-        acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory = Trajectory::uniform(0.0, 10.0, 10.0, vec![first]).expect("one segment");
-    let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).expect("a mount"));
+    let path = CameraPath::new(trajectory, &scenario.camera.mount).expect("a mount");
     let sequence = Sequence {
-        scenario,
-        path,
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 300,
-        scene: Arc::new(snow_and_forest()),
         vignette: vignette.map(Arc::new),
-        zoom_track: Vec::new(),
-        exposures: None,
+        ..Sequence::in_memory(scenario, path, snow_and_forest(), 300)
     };
     let exposures = ExposureTrack::new(&sequence).expect("a camera").map(|track| Arc::new(track) as _);
     Arc::new(Sequence { exposures, ..sequence })

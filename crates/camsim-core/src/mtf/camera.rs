@@ -195,12 +195,7 @@ fn window(camera: &CameraSpec) -> Result<(CameraSpec, CameraModel), EdgeError> {
 fn edge_sequence(camera: &CameraSpec, model: &CameraModel) -> Result<Sequence, EdgeError> {
     let side = camera.size_px[0];
     let still = BodyState {
-        position_ned_m: DVec3::ZERO,
-        velocity_ned_m_s: DVec3::ZERO,
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: glam::DQuat::IDENTITY,
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory = Trajectory::listed(vec![0.0], 1.0, vec![still]).ok_or(EdgeError::NoRays(side))?;
     let path = CameraPath::new(trajectory, &camera.mount)?;
@@ -223,15 +218,5 @@ fn edge_sequence(camera: &CameraSpec, model: &CameraModel) -> Result<Sequence, E
     let scene = Scene { meshes: vec![surface], sky_linear: [BRIGHT; 3], ..Scene::default() };
     let mut scenario = Scenario::new(FlightSpec::new(""), SceneSpec::default());
     scenario.camera = camera.clone();
-    Ok(Sequence {
-        scenario,
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 1,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    })
+    Ok(Sequence::in_memory(scenario, path, scene, 1))
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use glam::{DAffine3, DQuat};
+use glam::DAffine3;
 
 use super::*;
 use crate::{
@@ -28,10 +28,8 @@ fn path_with(vibration: &[VibrationSpec]) -> Arc<CameraPath> {
     let first = BodyState {
         position_ned_m: DVec3::new(0.0, 0.0, -50.0),
         velocity_ned_m_s: DVec3::new(20.0, 5.0, 1.0),
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
         rate_body_rad_s: DVec3::new(0.2, -0.1, 0.3),
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
     let spec =

@@ -39,11 +39,8 @@ fn input(trajectory: Trajectory, frame: Option<LocalFrame>, span_s: [f64; 2]) ->
 fn still(ned_from_body: DQuat) -> Trajectory {
     let state = BodyState {
         position_ned_m: DVec3::new(10.0, -20.0, -30.0),
-        velocity_ned_m_s: DVec3::ZERO,
-        acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body,
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     Trajectory::listed(vec![0.0], 1.0, vec![state]).unwrap()
 }

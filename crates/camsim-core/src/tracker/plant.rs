@@ -134,10 +134,9 @@ fn first_state(reference: &Reference, limits: &ResolvedLimits) -> BodyState {
     BodyState {
         position_ned_m: target.position_ned_m,
         velocity_ned_m_s: target.velocity_ned_m_s.clamp_length_max(limits.max_speed_m_s),
-        acceleration_ned_m_s2: DVec3::ZERO,
         ned_from_body: target.ned_from_body,
         rate_body_rad_s: target.rate_body_rad_s.clamp_length_max(limits.max_angular_rate_rad_s),
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     }
 }
 

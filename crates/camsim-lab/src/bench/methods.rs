@@ -22,9 +22,10 @@ const SIZE_CASE: &str = "blender-plane";
 pub(super) const MAX_SIDE_PX: u32 = 16_384;
 
 /// Kinds of methods.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MethodFamily {
     /// A tolerance; the plan chooses the methods.
+    #[default]
     Tolerance,
     /// The paper's preset.
     Paper,

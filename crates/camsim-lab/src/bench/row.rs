@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{methods::MethodFamily, rounds::Times, truth::PictureErrors};
 
 /// One row of the table: a case with a method. The first twelve fields are stable.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Row {
     /// Name of the case.
     pub case: String,
@@ -81,39 +81,9 @@ pub struct Row {
 impl Row {
     /// A row without measurements.
     pub(super) fn empty(case: &str, [width, height]: [u32; 2]) -> Self {
-        Self {
-            case: case.to_owned(),
-            preset: "default",
-            width,
-            height,
-            ms_per_frame_p50: f64::NAN,
-            ms_per_frame_p99: f64::NAN,
-            cpu_ms_per_frame: None,
-            coord_rms_px: None,
-            coord_p99_px: None,
-            coord_max_px: None,
-            psnr_db: None,
-            predicted_px: None,
-            knob: String::new(),
-            same_as: None,
-            family: MethodFamily::Tolerance,
-            group: "",
-            time_to_default: None,
-            edge_psnr_db: None,
-            smooth_rms_px: None,
-            smooth_p99_px: None,
-            edge_share: None,
-            compared: [0, 0],
-            falsely_valid: 0,
-            missing: 0,
-            coord_front: false,
-            image_front: false,
-            start_s: 0.0,
-            rounds: 0,
-            passes: Vec::new(),
-            times: Times::default(),
-            compared_ms: Vec::new(),
-        }
+        let [ms_per_frame_p50, ms_per_frame_p99] = [f64::NAN; 2];
+        let case = case.to_owned();
+        Self { case, preset: "default", width, height, ms_per_frame_p50, ms_per_frame_p99, ..Self::default() }
     }
 
     pub(super) fn set_times(&mut self, times: &Times, default: Option<&Times>) {

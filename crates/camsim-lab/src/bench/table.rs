@@ -14,6 +14,34 @@ const CYCLES: [(f64, f64); 3] = [(0.6, 42.0), (2.3, 48.0), (8.9, 54.0)];
 /// The case with rows of Blender Cycles.
 const CYCLES_CASE: &str = "blender-plane";
 
+/// The columns of the comma-separated values.
+const COLUMNS: [(&str, fn(&Row) -> String); 24] = [
+    ("case", |row| row.case.clone()),
+    ("preset", |row| row.preset.to_owned()),
+    ("width", |row| row.width.to_string()),
+    ("height", |row| row.height.to_string()),
+    ("ms_per_frame_p50", |row| number(Some(row.ms_per_frame_p50))),
+    ("ms_per_frame_p99", |row| number(Some(row.ms_per_frame_p99))),
+    ("cpu_ms_per_frame", |row| number(row.cpu_ms_per_frame)),
+    ("coord_rms_px", |row| number(row.coord_rms_px)),
+    ("coord_p99_px", |row| number(row.coord_p99_px)),
+    ("coord_max_px", |row| number(row.coord_max_px)),
+    ("psnr_db", |row| number(row.psnr_db)),
+    ("predicted_px", |row| number(row.predicted_px)),
+    ("knob", |row| format!("\"{}\"", row.knob)),
+    ("same_as", |row| row.same_as.as_ref().map_or(String::new(), |knob| format!("\"{knob}\""))),
+    ("group", |row| row.group.to_owned()),
+    ("edge_psnr_db", |row| number(row.edge_psnr_db)),
+    ("smooth_rms_px", |row| number(row.smooth_rms_px)),
+    ("smooth_p99_px", |row| number(row.smooth_p99_px)),
+    ("edge_share", |row| number(row.edge_share)),
+    ("falsely_valid", |row| row.falsely_valid.to_string()),
+    ("missing", |row| row.missing.to_string()),
+    ("coord_front", |row| row.coord_front.to_string()),
+    ("image_front", |row| row.image_front.to_string()),
+    ("rounds", |row| row.rounds.to_string()),
+];
+
 impl BenchReport {
     /// The tables as Markdown.
     #[must_use]
@@ -221,43 +249,10 @@ impl BenchReport {
     /// The rows as comma-separated values, one line each after a header.
     #[must_use]
     pub fn csv(&self) -> String {
-        let mut text = String::from(
-            "case,preset,width,height,ms_per_frame_p50,ms_per_frame_p99,cpu_ms_per_frame,coord_rms_px,\
-             coord_p99_px,coord_max_px,psnr_db,predicted_px,knob,same_as,group,edge_psnr_db,smooth_rms_px,\
-             smooth_p99_px,edge_share,falsely_valid,missing,coord_front,image_front,rounds\n",
-        );
-        let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
-        for row in &self.rows {
-            let cells = [
-                row.case.clone(),
-                row.preset.to_owned(),
-                row.width.to_string(),
-                row.height.to_string(),
-                number(Some(row.ms_per_frame_p50)),
-                number(Some(row.ms_per_frame_p99)),
-                number(row.cpu_ms_per_frame),
-                number(row.coord_rms_px),
-                number(row.coord_p99_px),
-                number(row.coord_max_px),
-                number(row.psnr_db),
-                number(row.predicted_px),
-                format!("\"{}\"", row.knob),
-                row.same_as.as_ref().map_or(String::new(), |knob| format!("\"{knob}\"")),
-                row.group.to_owned(),
-                number(row.edge_psnr_db),
-                number(row.smooth_rms_px),
-                number(row.smooth_p99_px),
-                number(row.edge_share),
-                row.falsely_valid.to_string(),
-                row.missing.to_string(),
-                row.coord_front.to_string(),
-                row.image_front.to_string(),
-                row.rounds.to_string(),
-            ];
-            text.push_str(&cells.join(","));
-            text.push('\n');
-        }
-        text
+        let line = |cells: Vec<String>| cells.join(",") + "\n";
+        let header = line(COLUMNS.iter().map(|(name, _)| (*name).to_owned()).collect());
+        let of_row = |row: &Row| line(COLUMNS.iter().map(|(_, cell)| cell(row)).collect());
+        header + &self.rows.iter().map(of_row).collect::<String>()
     }
 
     /// Plots RMS source error over time, both logarithmic. A point is the geometric mean of a method over the
@@ -306,10 +301,10 @@ impl BenchReport {
                 better
             });
             dominated.extend(rest);
-            series.push(Series { name: group.to_owned(), points: front, joined: true });
+            series.push(Series::line(group, front));
         }
-        series.push(Series { name: "not on a curve".to_owned(), points: dominated, joined: false });
-        series.push(Series { name: "paper preset".to_owned(), points: paper, joined: false });
+        series.push(Series::dots("not on a curve", dominated));
+        series.push(Series::dots("paper preset", paper));
         let plot = Plot {
             title: format!(
                 "Error against time, camsim {}, {}",
@@ -337,6 +332,10 @@ impl BenchReport {
             self.violations.len()
         )
     }
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or(String::new(), |value| format!("{value:.6e}"))
 }
 
 fn decimal(value: Option<f64>) -> String {

@@ -52,7 +52,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
     let series = [("rotation", rotation), ("translation", translation)].into_iter().flat_map(
         |(name, [straight, curved])| {
             [("straight line (paper)", straight), ("each sample at its own source", curved)]
-                .map(|(path, points)| Series { name: format!("{name}, {path}"), points, joined: true })
+                .map(|(path, points)| Series::line(format!("{name}, {path}"), points))
         },
     );
     report.plots.push((

@@ -8,13 +8,11 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    camera::CameraModel,
     frame::RenderedFrame,
     pose::CameraPose,
     scenario::{CameraSpec, Channel, LensSpec, ShutterSpec},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::Sequence,
-    shutter::Shutter,
     temporal::{
         ColorImage, IdealGeometry,
         displacement::{Twist, image_rate, rk2, rk2_steps},
@@ -140,10 +138,7 @@ impl PaperIdealFrame {
         path: SamplePath,
         averaging: Averaging,
     ) -> Result<RenderedFrame, ReproduceError> {
-        let lens =
-            CameraModel::from_spec(camera).map_err(|error| ReproduceError::setup("the camera", error))?;
-        let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)
-            .map_err(|error| ReproduceError::setup("the shutter", error))?;
+        let (lens, shutter) = test_bench::model_and_shutter(camera)?;
         let [width, height] = camera.size_px;
         let pixel = |i: u32| {
             let [x, y] = [i % width, i / width];
@@ -164,6 +159,18 @@ impl PaperIdealFrame {
         };
         let color_rgba = (0..width * height).into_par_iter().flat_map_iter(pixel).collect();
         Ok(RenderedFrame { size_px: camera.size_px, color_rgba, ..RenderedFrame::default() })
+    }
+
+    /// As [`Self::frame`], without exposure.
+    ///
+    /// # Errors
+    /// A camera that cannot be used.
+    pub fn instant(
+        &self,
+        camera: &CameraSpec,
+        model: DisplacementModel,
+    ) -> Result<RenderedFrame, ReproduceError> {
+        self.frame(camera, model, 1, SamplePath::Straight, Averaging::Linear)
     }
 
     fn nearest_inverse_depth(&self, uv: DVec2) -> f64 {

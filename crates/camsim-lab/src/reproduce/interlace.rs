@@ -7,7 +7,7 @@ use camsim_core::{
 
 use super::{
     ExperimentReport, Picture, ReproduceError, Setup, Table,
-    displacement::{Averaging, DisplacementModel, PaperIdealFrame, SamplePath},
+    displacement::{DisplacementModel, PaperIdealFrame},
     test_bench::{self, Motion, TARGET_M},
 };
 
@@ -49,29 +49,11 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
         "Fig. 20 against rows of two perfect pictures, linear light",
         &["method", "PSNR, dB", "largest difference"],
     );
-    let step_rad = 2.5_f64.to_radians();
+    let paper = |model: DisplacementModel| ideal.instant(&interlaced.scenario.camera, model);
     let mut frames = vec![first, second];
     for (method, frame) in [
-        (
-            "paper: linear, one step",
-            ideal.frame(
-                &interlaced.scenario.camera,
-                DisplacementModel::Linear(f64::INFINITY),
-                1,
-                SamplePath::Straight,
-                Averaging::Linear,
-            )?,
-        ),
-        (
-            "paper: RK2",
-            ideal.frame(
-                &interlaced.scenario.camera,
-                DisplacementModel::Rk2(step_rad),
-                1,
-                SamplePath::Straight,
-                Averaging::Linear,
-            )?,
-        ),
+        ("paper: linear, one step", paper(DisplacementModel::Linear(f64::INFINITY))?),
+        ("paper: RK2", paper(DisplacementModel::Rk2(2.5_f64.to_radians()))?),
         ("camsim", own),
     ] {
         let difference = test_bench::difference(&frame, &truth)?;

@@ -7,7 +7,6 @@ use camsim_core::{
     flight_log::{HeightConversion, LogRow},
     frame::RenderedFrame,
     lens::paper::gauss_newton,
-    mount::CameraPath,
     reference::ErrorStats,
     scenario::{CameraSpec, FlightSpec, LensModel, LensSpec, LogFormat, TrackerKind, TrackerSpec},
     scene::Scene,
@@ -101,19 +100,7 @@ fn sequence(
 ) -> Result<Arc<Sequence>, ReproduceError> {
     let spec = TrackerSpec { kind: TrackerKind::Linear, ..TrackerSpec::default() };
     let tracked = track(rows, &spec).map_err(|error| ReproduceError::setup("the list of poses", error))?;
-    let path = CameraPath::new(tracked.trajectory, &camera.mount)
-        .map_err(|error| ReproduceError::setup("the mount", error))?;
-    Ok(Arc::new(Sequence {
-        scenario: test_bench::scenario(camera),
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: rows.len() as u64,
-        scene: scene.clone(),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    }))
+    test_bench::in_memory(camera, tracked.trajectory, rows.len() as u64, scene)
 }
 
 /// Circles detected in all frames of one calibration.
@@ -138,19 +125,10 @@ pub(super) fn detect(
     let calibration = if calibration == 0 { opencv } else { agisoft };
     let rows = poses(setup, calibration.poses)?;
     let sequence = sequence(calibration.camera, &rows, &test_bench::target(setup, TARGET_M)?)?;
-    let (camera, shutter) = test_bench::camera_and_shutter(&sequence)?;
     let mut detections =
         CircleDetections { pairs: Vec::new(), missed: 0, true_circles: Vec::new(), frames: Vec::new() };
     for finished in test_bench::render(setup.engine, &sequence, &[], 0..count.min(sequence.frames))? {
-        let stamp_s = finished.plan.stamp_s;
-        let true_circles: Vec<Option<CircleImage>> = super::circle_grid::circles(TARGET_M)
-            .iter()
-            .map(|circle| {
-                circle
-                    .image(|point| test_bench::project(&sequence, &camera, &shutter, stamp_s, point))
-                    .filter(|circle| is_inside(circle, camera.size_px))
-            })
-            .collect();
+        let true_circles = test_bench::grid_images(&sequence, finished.plan.stamp_s, TARGET_M)?;
         let in_view: Vec<CircleImage> = true_circles.iter().flatten().copied().collect();
         let matches = match_circles(&in_view, &detect_blobs(&finished.frame));
         detections.missed += matches.missed;
@@ -159,12 +137,6 @@ pub(super) fn detect(
         detections.frames.push(finished.frame);
     }
     Ok(detections)
-}
-
-/// Whether a circle is wholly within the frame, with a margin of 3 px.
-fn is_inside(circle: &CircleImage, size_px: [u32; 2]) -> bool {
-    let last = DVec2::new(f64::from(size_px[0]) - 1.0, f64::from(size_px[1]) - 1.0);
-    circle.bounds_px[0].cmpge(DVec2::splat(3.0)).all() && circle.bounds_px[1].cmple(last - 3.0).all()
 }
 
 impl CircleDetections {
@@ -226,8 +198,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
     );
     let mut series = Vec::new();
     for (calibration, found) in calibrations(setup.width_px).iter().zip(&detections) {
-        let camera = camsim_core::camera::CameraModel::from_spec(&calibration.camera)
-            .map_err(|error| ReproduceError::setup("the camera", error))?;
+        let camera = model(calibration)?;
         let stats = ErrorStats::of(found.errors_px());
         let of_centres = ErrorStats::of(
             found.pairs.iter().map(|(circle, blob)| circle.centre_px.distance(blob.centroid_px)).collect(),
@@ -243,11 +214,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
             short(of_centres.rms_px),
             format!("{:.2} %", 100.0 * (1.0 - camera.check().valid_fraction)),
         ]);
-        series.push(Series {
-            name: calibration.name.into(),
-            points: found.rings(camera.principal_point_px, setup.width_px),
-            joined: true,
-        });
+        let points = found.rings(camera.principal_point_px, setup.width_px);
+        series.push(Series::line(calibration.name, points));
     }
     report.tables.push(("circles", table));
     if setup.data.is_some() {
@@ -416,8 +384,7 @@ mod tests {
 
     #[test]
     fn plot_needs_a_ring_with_points() {
-        let series =
-            |points: &[(f64, f64)]| Series { name: String::new(), points: points.to_vec(), joined: true };
+        let series = |points: &[(f64, f64)]| Series::line("", points.to_vec());
         assert_eq!(radius_plot(vec![series(&[]), series(&[])]), None);
         assert!(
             radius_plot(vec![series(&[]), series(&[(10.0, 0.1)])]).is_some_and(|plot| plot.svg().is_ok())

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::{
     ExperimentReport, Picture, ReproduceError, Setup, Table,
     circles::{CircleMatches, detect_blobs, match_circles},
-    displacement::{Averaging, DisplacementModel, PaperIdealFrame, SamplePath},
+    displacement::{DisplacementModel, PaperIdealFrame},
     short,
     test_bench::{self, FLIGHT_M_S, HEIGHT_M, Motion, TARGET_M},
 };
@@ -78,13 +78,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
         );
         let still = test_bench::snapshot(setup.engine, &bench, 0.0)?;
         let ideal = PaperIdealFrame::render(setup.engine, &bench, 0.0)?;
-        let paper = ideal.frame(
-            &bench.scenario.camera,
-            DisplacementModel::Rk2(2.5_f64.to_radians()),
-            1,
-            SamplePath::Straight,
-            Averaging::Linear,
-        )?;
+        let rk2 = DisplacementModel::Rk2(2.5_f64.to_radians());
+        let paper = ideal.instant(&bench.scenario.camera, rk2)?;
         let own = test_bench::render_first(setup.engine, &bench)?;
         for (method, frame) in [("paper: RK2 from the frame of the stamp", &paper), ("camsim", &own)] {
             let result = measure(&bench, name, frame)?;

@@ -145,10 +145,9 @@ fn table(ms: &[f64]) -> Table {
 }
 
 fn plot(ms: &[f64]) -> Plot {
-    let series = |name: &str, first: usize| Series {
-        name: name.into(),
-        points: ms.iter().skip(first).step_by(3).enumerate().map(|(k, ms)| (k as f64 + 1.0, *ms)).collect(),
-        joined: true,
+    let series = |name: &str, first: usize| {
+        let points = ms.iter().skip(first).step_by(3).enumerate();
+        Series::line(name, points.map(|(k, ms)| (k as f64 + 1.0, *ms)).collect())
     };
     let reference = CASES.iter().enumerate().map(|(k, case)| (k as f64 + 1.0, case.5)).collect();
     Plot {
@@ -160,11 +159,7 @@ fn plot(ms: &[f64]) -> Plot {
             series("paper preset", 0),
             series("camsim", 1),
             series("camsim without silhouette rays", 2),
-            Series {
-                name: "reference program (software adapter, two cores)".into(),
-                points: reference,
-                joined: false,
-            },
+            Series::dots("reference program (software adapter, two cores)", reference),
         ],
     }
 }

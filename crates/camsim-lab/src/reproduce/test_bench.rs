@@ -100,10 +100,9 @@ impl Motion {
         let first = BodyState {
             position_ned_m: DVec3::new(0.0, 0.0, -HEIGHT_M) - SPAN_S * self.velocity_ned_m_s,
             velocity_ned_m_s: self.velocity_ned_m_s,
-            acceleration_ned_m_s2: DVec3::ZERO,
             ned_from_body: DQuat::from_scaled_axis(-SPAN_S * rate_body_rad_s),
             rate_body_rad_s,
-            angular_acceleration_body_rad_s2: DVec3::ZERO,
+            ..BodyState::default()
         };
         Trajectory::uniform(-SPAN_S, 2.0 * SPAN_S, SPAN_S, vec![first])
     }
@@ -132,19 +131,23 @@ pub fn sequence(
 ) -> Result<Arc<Sequence>, ReproduceError> {
     let trajectory =
         motion.trajectory().ok_or_else(|| ReproduceError::setup("the motion", "it is not finite"))?;
+    in_memory(camera, trajectory, 10_000, scene)
+}
+
+/// The sequence of a camera on a trajectory, with the first stamp at 0.
+///
+/// # Errors
+/// An invalid mount.
+pub fn in_memory(
+    camera: CameraSpec,
+    trajectory: impl Into<Arc<Trajectory>>,
+    frames: u64,
+    scene: &Arc<Scene>,
+) -> Result<Arc<Sequence>, ReproduceError> {
     let path = CameraPath::new(trajectory, &camera.mount)
         .map_err(|error| ReproduceError::setup("the mount", error))?;
-    Ok(Arc::new(Sequence {
-        scenario: scenario(camera),
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 10_000,
-        scene: scene.clone(),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    }))
+    let sequence = Sequence::in_memory(scenario(camera), path, Scene::default(), frames);
+    Ok(Arc::new(Sequence { scene: scene.clone(), ..sequence }))
 }
 
 /// The circle grid: the paper's own picture if there is a data folder, otherwise an equal one.
@@ -315,15 +318,43 @@ pub fn project(
 /// # Errors
 /// An invalid camera or shutter.
 pub fn camera_and_shutter(sequence: &Sequence) -> Result<(CameraModel, Shutter), ReproduceError> {
-    let spec = &sequence.scenario.camera;
+    model_and_shutter(&sequence.scenario.camera)
+}
+
+/// Model and shutter of a camera.
+///
+/// # Errors
+/// An invalid camera or shutter.
+pub fn model_and_shutter(spec: &CameraSpec) -> Result<(CameraModel, Shutter), ReproduceError> {
     let camera = CameraModel::from_spec(spec).map_err(|error| ReproduceError::setup("the camera", error))?;
     let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px)
         .map_err(|error| ReproduceError::setup("the shutter", error))?;
     Ok((camera, shutter))
 }
 
-/// Images of the target's circles in the frame with the stamp `stamp_s`, of those wholly within the frame
-/// with a margin of 3 px.
+/// Images of the target's circles in the frame with the stamp `stamp_s`, in the order of the grid; `None` for those
+/// that are not wholly within the frame with a margin of 3 px.
+///
+/// # Errors
+/// An invalid camera or shutter.
+pub fn grid_images(
+    sequence: &Sequence,
+    stamp_s: f64,
+    target_m: f64,
+) -> Result<Vec<Option<circle_grid::CircleImage>>, ReproduceError> {
+    let (camera, shutter) = camera_and_shutter(sequence)?;
+    let last = DVec2::new(f64::from(camera.size_px[0]) - 1.0, f64::from(camera.size_px[1]) - 1.0);
+    let is_inside = |circle: &circle_grid::CircleImage| {
+        let [low, high] = circle.bounds_px;
+        low.cmpge(DVec2::splat(3.0)).all() && high.cmple(last - 3.0).all()
+    };
+    let image = |circle: &circle_grid::Circle| {
+        circle.image(|point| project(sequence, &camera, &shutter, stamp_s, point)).filter(is_inside)
+    };
+    Ok(circle_grid::circles(target_m).iter().map(image).collect())
+}
+
+/// The circles of [`grid_images`] that are within the frame.
 ///
 /// # Errors
 /// An invalid camera or shutter.
@@ -332,16 +363,5 @@ pub fn circles_in_view(
     stamp_s: f64,
     target_m: f64,
 ) -> Result<Vec<circle_grid::CircleImage>, ReproduceError> {
-    let (camera, shutter) = camera_and_shutter(sequence)?;
-    let last = DVec2::new(f64::from(camera.size_px[0]) - 1.0, f64::from(camera.size_px[1]) - 1.0);
-    let is_inside = |circle: &circle_grid::CircleImage| {
-        let [low, high] = circle.bounds_px;
-        low.cmpge(DVec2::splat(3.0)).all() && high.cmple(last - 3.0).all()
-    };
-    let circles = circle_grid::circles(target_m)
-        .iter()
-        .filter_map(|circle| circle.image(|point| project(sequence, &camera, &shutter, stamp_s, point)))
-        .filter(is_inside)
-        .collect();
-    Ok(circles)
+    Ok(grid_images(sequence, stamp_s, target_m)?.into_iter().flatten().collect())
 }

@@ -8,7 +8,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use super::{
     ExperimentReport, Picture, ReproduceError, Setup, Table,
     circles::{detect_blobs, match_circles},
-    displacement::{Averaging, DisplacementModel, PaperIdealFrame, SamplePath},
+    displacement::{DisplacementModel, PaperIdealFrame},
     short,
     test_bench::{self, Motion, TARGET_M, TURN_DEG_S},
 };
@@ -105,8 +105,7 @@ fn rotation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), Repr
     let delayed =
         test_bench::with_shutter(&bench, 1.0, ShutterSpec { delay_ms: 1000.0, ..ShutterSpec::default() });
     let spec = &delayed.scenario.camera;
-    let paper =
-        |model: DisplacementModel| ideal.frame(spec, model, 1, SamplePath::Straight, Averaging::Linear);
+    let paper = |model: DisplacementModel| ideal.instant(spec, model);
     let own = test_bench::render_first(setup.engine, &delayed)?;
     let (own_px, own_missed) = detection_error(&own, &circles);
 
@@ -147,10 +146,8 @@ fn rotation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), Repr
     let cell = |text: &str| text.to_owned();
     table.row([cell("camsim, its own frame"), cell("-"), cell("-"), short(own_px), own_missed.to_string()]);
     report.tables.push(("fig14", table));
-    let curve = |name: &str, errors: &[StepError], pick: fn(&StepError) -> f64| Series {
-        name: name.into(),
-        points: errors.iter().map(|error| (error.step_deg, pick(error))).collect(),
-        joined: true,
+    let curve = |name: &str, errors: &[StepError], pick: fn(&StepError) -> f64| {
+        Series::line(name, errors.iter().map(|error| (error.step_deg, pick(error))).collect())
     };
     report.plots.push((
         "fig14",
@@ -164,17 +161,9 @@ fn rotation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), Repr
                 curve("RK2, circles", &on_circles, |e| e.rk2_px),
                 curve("RK2, whole frame", &on_frame, |e| e.rk2_px),
                 curve("RK2, pitch instead of roll", &pitched, |e| e.rk2_px),
-                Series { name: "RK2, circles detected in frames".into(), points: by_pictures, joined: true },
-                Series {
-                    name: "camsim, circles detected in its frame".into(),
-                    points: vec![(0.5, own_px), (36.0, own_px)],
-                    joined: true,
-                },
-                Series {
-                    name: "text of the paper: 0.02 px at 2.5 deg".into(),
-                    points: vec![(2.5, 0.02)],
-                    joined: false,
-                },
+                Series::line("RK2, circles detected in frames", by_pictures),
+                Series::line("camsim, circles detected in its frame", vec![(0.5, own_px), (36.0, own_px)]),
+                Series::dots("text of the paper: 0.02 px at 2.5 deg", vec![(2.5, 0.02)]),
             ],
         },
     ));
@@ -214,9 +203,7 @@ fn translation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), R
         let ideal = PaperIdealFrame::render(setup.engine, &bench, 1.0)?;
         let delayed =
             test_bench::with_shutter(&bench, 1.0, ShutterSpec { delay_ms: 1000.0, ..ShutterSpec::default() });
-        let paper = |model: DisplacementModel| {
-            ideal.frame(&delayed.scenario.camera, model, 1, SamplePath::Straight, Averaging::Linear)
-        };
+        let paper = |model: DisplacementModel| ideal.instant(&delayed.scenario.camera, model);
         let linear = paper(DisplacementModel::Linear(f64::INFINITY))?;
         let own = test_bench::render_first(setup.engine, &delayed)?;
         for (model, frame) in [

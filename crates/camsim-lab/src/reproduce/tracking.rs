@@ -152,9 +152,6 @@ fn error_plot(log: &FlightLog, flights: &[TrackedFlight]) -> Plot {
         x_label: "time from the first row, s".into(),
         y_label: "distance, m".into(),
         log: [false, false],
-        series: flights
-            .iter()
-            .map(|flight| Series { name: flight.name.into(), points: points(&flight.tracked), joined: true })
-            .collect(),
+        series: flights.iter().map(|flight| Series::line(flight.name, points(&flight.tracked))).collect(),
     }
 }

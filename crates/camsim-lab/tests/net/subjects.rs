@@ -13,7 +13,7 @@ use camsim_core::{
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
 use camsim_lab::{bench::methods::resize, cases};
 use camsim_plan::{FramePlan, PlanError, Planner};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Changes a sequence after it has got its size.
 type Edit = fn(&mut Sequence);
@@ -185,11 +185,7 @@ fn glass(sequence: &mut Sequence) {
 fn hover(over: &Sequence, pitch_deg: f64) -> Arc<Sequence> {
     let state = BodyState {
         position_ned_m: DVec3::new(0.0, 0.0, -150.0),
-        velocity_ned_m_s: DVec3::ZERO,
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory = Trajectory::uniform(-1.0, 2.0, 1.0, vec![state]).expect("a trajectory");
     let mut camera = CameraSpec::default();

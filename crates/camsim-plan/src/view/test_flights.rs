@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use camsim_core::{mount::CameraPath, pose::BodyState, scenario::MountSpec, trajectory::Trajectory};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 pub(crate) const SPEED_M_S: f64 = 40.0;
 
@@ -17,10 +17,7 @@ pub(crate) fn flying_east_from(from_ned_m: DVec3, up_deg: f64) -> CameraPath {
     let state = |t_s: f64| BodyState {
         position_ned_m: from_ned_m + SPEED_M_S * t_s * DVec3::Y,
         velocity_ned_m_s: DVec3::new(0.0, SPEED_M_S, 0.0),
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
-        rate_body_rad_s: DVec3::ZERO,
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let mount = MountSpec { angles_deg: [0.0, up_deg, 0.0], ..MountSpec::default() };
     let knots = (0..=20).map(|k| state(0.1 * f64::from(k) - 1.0)).collect();

@@ -57,10 +57,9 @@ impl Steady {
         let first = BodyState {
             position_ned_m: self.position_ned_m - BEFORE_S * self.velocity_ned_m_s,
             velocity_ned_m_s: self.velocity_ned_m_s,
-            acceleration_ned_m_s2: DVec3::ZERO,
             ned_from_body: self.ned_from_body * DQuat::from_scaled_axis(-BEFORE_S * self.rate_body_rad_s),
             rate_body_rad_s: self.rate_body_rad_s,
-            angular_acceleration_body_rad_s2: DVec3::ZERO,
+            ..BodyState::default()
         };
         Trajectory::uniform(-BEFORE_S, 2.0 * BEFORE_S, BEFORE_S, vec![first]).unwrap()
     }
@@ -69,17 +68,7 @@ impl Steady {
 /// A sequence whose frame 0 has its stamp at t = 0.
 pub fn sequence(scenario: Scenario, motion: Steady, scene: Scene) -> Arc<Sequence> {
     let path = CameraPath::new(motion.trajectory(), &scenario.camera.mount).unwrap();
-    Arc::new(Sequence {
-        scenario,
-        path: Arc::new(path),
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 100,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    })
+    Arc::new(Sequence::in_memory(scenario, path, scene, 100))
 }
 
 pub fn checker(squares: u32) -> Arc<Texture> {

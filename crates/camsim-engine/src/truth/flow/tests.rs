@@ -96,24 +96,12 @@ fn sequence_with(
     let first = BodyState {
         position_ned_m: DVec3::new(north_m, east_m, -50.0),
         velocity_ned_m_s: DVec3::new(10.0, -2.0, 1.0),
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
         rate_body_rad_s: DVec3::new(0.1, -0.1, 0.3),
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
-    let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).unwrap());
-    Arc::new(Sequence {
-        scenario,
-        path,
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 9,
-        scene: Arc::new(scene),
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    })
+    let path = CameraPath::new(trajectory, &scenario.camera.mount).unwrap();
+    Arc::new(Sequence::in_memory(scenario, path, scene, 9))
 }
 
 /// Mid-exposure of a fractional row of a frame.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DQuat, DVec2};
+use glam::DVec2;
 
 use glam::DVec3;
 
@@ -53,25 +53,12 @@ fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Ar
     let first = BodyState {
         position_ned_m: DVec3::new(-100.0, -20.0, -60.0),
         velocity_ned_m_s: DVec3::new(50.0, 10.0, 0.0),
-        acceleration_ned_m_s2: DVec3::ZERO,
-        ned_from_body: DQuat::IDENTITY,
         rate_body_rad_s: DVec3::new(0.1, -0.2, 0.3),
-        angular_acceleration_body_rad_s2: DVec3::ZERO,
+        ..BodyState::default()
     };
     let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
-    let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).unwrap());
-    let scene = Arc::new(scene);
-    Arc::new(Sequence {
-        scenario,
-        path,
-        epoch_ns: 0,
-        start_s: 0.0,
-        frames: 9,
-        scene,
-        vignette: None,
-        zoom_track: Vec::new(),
-        exposures: None,
-    })
+    let path = CameraPath::new(trajectory, &scenario.camera.mount).unwrap();
+    Arc::new(Sequence::in_memory(scenario, path, scene, 9))
 }
 
 #[test]

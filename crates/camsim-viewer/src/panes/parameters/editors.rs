@@ -167,7 +167,7 @@ impl Editor<'_> {
     /// A list of numbers with labels.
     fn numbers(&mut self, count: usize) -> Option<Edit> {
         let labels = match self.key.rsplit('.').next() {
-            Some("coefficients") => self.ModelFacts::of(document.scenario.camera.lens.model).coefficients,
+            Some("coefficients") => ModelFacts::of(self.document.scenario.camera.lens.model).coefficients,
             _ => self.facts.field.names,
         };
         let array = self.value?.as_array()?;
