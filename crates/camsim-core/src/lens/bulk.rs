@@ -89,50 +89,44 @@ impl Bulk {
 
     /// Ideal points of a block.
     pub(crate) fn ideal(&self, lens: &Lens, block: &mut Block) {
-        match (self, lens) {
-            (Self::Pinhole, _) => pinhole(block),
-            (Self::Plane(grid), Lens::BrownConrady(lens)) => formula_of(lens).ideal(grid, block),
-            (Self::Plane(grid), Lens::Direction(lens)) => {
-                if let Some(formula) = lens.plane() {
-                    formula.ideal(grid, block);
-                }
-            }
-            (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.ideal(lens, block),
-            (Self::Scaled(whole), Lens::Scaled(lens)) => {
-                scaled(lens, block, |block| whole.ideal(lens.whole(), block));
-            }
-            (Self::Circle(whole), Lens::Circle(lens)) => {
-                whole.ideal(lens.whole(), block);
-                within(lens, block, |[x, y, _]| DVec3::new(x, y, 1.0));
-            }
-            _ => block.solved[0].fill(f64::NAN),
-        }
+        self.solve::<false>(lens, block);
     }
 
     /// Unit rays of a block.
     pub(crate) fn rays(&self, lens: &Lens, block: &mut Block) {
+        self.solve::<true>(lens, block);
+    }
+
+    fn solve<const RAYS: bool>(&self, lens: &Lens, block: &mut Block) {
         match (self, lens) {
             (Self::Pinhole, _) => {
                 pinhole(block);
-                plane::to_unit_length(block);
-            }
-            (Self::Plane(grid), Lens::BrownConrady(lens)) => formula_of(lens).rays(grid, block),
-            (Self::Plane(grid), Lens::Direction(lens)) => {
-                if let Some(formula) = lens.plane() {
-                    formula.rays(grid, block);
+                if RAYS {
+                    plane::to_unit_length(block);
                 }
             }
-            (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.rays(lens, block),
+            (Self::Plane(grid), Lens::BrownConrady(lens)) => of_plane::<RAYS>(&formula_of(lens), grid, block),
+            (Self::Plane(grid), Lens::Direction(lens)) => {
+                if let Some(formula) = lens.plane() {
+                    of_plane::<RAYS>(formula, grid, block);
+                }
+            }
+            (Self::RotationSymmetric(tables), Lens::Radial(lens)) if RAYS => tables.rays(lens, block),
+            (Self::RotationSymmetric(tables), Lens::Radial(lens)) => tables.ideal(lens, block),
             (Self::Scaled(whole), Lens::Scaled(lens)) => {
-                scaled(lens, block, |block| whole.rays(lens.whole(), block));
+                scaled(lens, block, |block| whole.solve::<RAYS>(lens.whole(), block));
             }
             (Self::Circle(whole), Lens::Circle(lens)) => {
-                whole.rays(lens.whole(), block);
-                within(lens, block, |[x, y, z]| DVec3::new(x, y, z));
+                whole.solve::<RAYS>(lens.whole(), block);
+                within(lens, block, |[x, y, z]| DVec3::new(x, y, if RAYS { z } else { 1.0 }));
             }
             _ => block.solved[0].fill(f64::NAN),
         }
     }
+}
+
+fn of_plane<const RAYS: bool>(formula: &(impl PlaneFormula + ?Sized), grid: &Grid, block: &mut Block) {
+    if RAYS { formula.rays(grid, block) } else { formula.ideal(grid, block) }
 }
 
 fn formula_of(lens: &BrownConrady) -> Formula {
