@@ -228,32 +228,15 @@ pub fn reproject_nodes(
     iterations: u32,
     key: &KeyDepth<'_>,
 ) -> Vec<Option<Source>> {
-    let looked_up = |pose, guess, iterations| iterate_depth(uv, pose, guess, iterations, key).in_key;
-    let (Some(&begin), Some(&end)) = (nodes.first(), nodes.last()) else { return Vec::new() };
-    let begun_with = |pose, guess| looked_up(pose, Some(guess), iterations.max(2) - 1);
-    let steps = (nodes.len() - 1).max(1) as f64;
-    let key_inverse_depths: Vec<f64> = match depths {
-        NodeDepths::Mid => vec![looked_up(mid, None, iterations); nodes.len()],
-        NodeDepths::Ends => {
-            let first = looked_up(begin, None, iterations);
-            let step = (begun_with(end, first) - first) / steps;
-            (0..nodes.len()).map(|node| first + node as f64 * step).collect()
-        }
-        NodeDepths::Three => {
-            let middle = looked_up(mid, None, iterations);
-            let between = parabola_through([begun_with(begin, middle), middle, begun_with(end, middle)]);
-            (0..nodes.len()).map(|node| between(node as f64 / steps)).collect()
-        }
-        NodeDepths::Each => {
-            let first = looked_up(begin, None, iterations);
-            let next = |before: &mut f64, &pose: &(DMat3, DVec3)| {
-                *before = begun_with(pose, *before);
-                Some(*before)
-            };
-            std::iter::once(first).chain(nodes[1..].iter().scan(first, next)).collect()
-        }
+    let look_up = |node: Option<usize>, guess: Option<f64>| {
+        let iterations = if guess.is_some() { iterations.max(2) - 1 } else { iterations };
+        iterate_depth(uv, node.map_or(mid, |node| nodes[node]), guess, iterations, key).in_key
     };
-    nodes.iter().zip(key_inverse_depths).map(|(&pose, w)| reproject_with(uv, pose, w, key.ideal)).collect()
+    let mut sources = Vec::with_capacity(nodes.len());
+    depths.of_nodes(nodes.len(), look_up, |node, in_key| {
+        sources.push(reproject_with(uv, nodes[node], in_key, key.ideal));
+    });
+    sources
 }
 
 /// The parabola through three values at 0, 1/2 and 1.
@@ -336,7 +319,8 @@ pub fn plane_inverse_depth(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 
 
 /// Inverse depth on the ray of an output row of a surface with inverse depth `key_inverse_depth` in the key
 /// frame. `None` at or behind the image plane of the row's camera.
-fn row_inverse_depth(direction: DVec3, shift: DVec3, key_inverse_depth: f64) -> Option<f64> {
+#[must_use]
+pub fn row_inverse_depth(direction: DVec3, shift: DVec3, key_inverse_depth: f64) -> Option<f64> {
     let scale = 1.0 - shift.z * key_inverse_depth;
     (scale > 1e-3).then(|| key_inverse_depth * direction.z / scale)
 }

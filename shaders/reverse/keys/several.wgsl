@@ -1,6 +1,6 @@
 // Several ideal frames, at the middles of equal parts of the window, one below the other in the same
 // textures. Functions that read them or the poses use the key that was selected last. Twin:
-// camsim_core::temporal::silhouette_rays::nearest_key.
+// camsim_core::temporal::silhouette_rays::nearest_first.
 
 var<private> selected_key: u32 = 0u;
 

@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::{IdealGeometry, supersampled::SupersampledImage};
+use super::{IdealGeometry, MAX_KEYS, supersampled::SupersampledImage};
 
 /// Golden ratio: the fractional parts of its multiples are evenly spread for any number of them (Kronecker
 /// sequence).
@@ -63,15 +63,35 @@ pub struct SurfaceHit {
     pub is_visible: bool,
 }
 
-/// Index of the ideal frame at a rank (0 = nearest in time) among `count`, whose key instants are the middles
-/// of equal parts of the window.
-#[must_use]
-pub fn nearest_key(share: f64, count: usize, rank: usize) -> usize {
-    let distance = |key: usize| (share * count as f64 - key as f64 - 0.5).abs();
-    let mut keys: Vec<usize> = (0..count).collect();
-    // The sort is stable: of two at equal distance the earlier one comes first.
-    keys.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-    keys.get(rank).copied().unwrap_or_default()
+/// Ideal frames in order of their distance in time from a share of the window: their key instants are the middles of
+/// `count` equal parts of it. Of two at equal distance the earlier one comes first.
+pub fn nearest_first(share: f64, count: usize) -> impl Iterator<Item = usize> {
+    let mut used = [false; MAX_KEYS as usize];
+    let distance = move |key: usize| (share * count as f64 - key as f64 - 0.5).abs();
+    (0..count).map(move |_| {
+        let free = (0..count).filter(|&key| !used[key]);
+        let nearest = free.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or_default();
+        used[nearest] = true;
+        nearest
+    })
+}
+
+/// First intersection of a ray at a share of the window, and the number of the ideal frame that shows it: the nearest
+/// one in time, or else the next one in which the intersection is visible. `hit` is that in one of `count` frames.
+pub fn first_visible(
+    window_share: f64,
+    count: usize,
+    hit: impl Fn(usize) -> Option<SurfaceHit>,
+) -> Option<(usize, SurfaceHit)> {
+    let mut first = None;
+    for key in nearest_first(window_share, count) {
+        let found = (key, hit(key)?);
+        if found.1.is_visible {
+            return Some(found);
+        }
+        first = first.or(Some(found));
+    }
+    first
 }
 
 /// Pose at a share of the exposure, linear between nodes.
@@ -85,8 +105,7 @@ fn pose_along(nodes: &[(DMat3, DVec3)], share: f64) -> Option<(DMat3, DVec3)> {
     }))
 }
 
-/// First intersection of a ray, and the ideal frame that shows it: the nearest one in time, or else the next
-/// one in which the intersection is visible.
+/// First intersection of a ray at a share of the exposure, as [`first_visible`].
 #[must_use]
 pub fn first_surface_of_keys(
     uv: DVec2,
@@ -95,17 +114,10 @@ pub fn first_surface_of_keys(
     ideal: &IdealGeometry,
 ) -> Option<(usize, SurfaceHit)> {
     let window_share = keys.row_share + (share - 0.5) * keys.exposure_share;
-    let mut first = None;
-    for rank in 0..keys.views.len() {
-        let key = nearest_key(window_share, keys.views.len(), rank);
+    first_visible(window_share, keys.views.len(), |key| {
         let view = keys.views.get(key)?;
-        let hit = first_surface(uv, pose_along(view.nodes, share)?, keys.nearest_w, &view.image, ideal);
-        if hit.is_visible {
-            return Some((key, hit));
-        }
-        first = first.or(Some((key, hit)));
-    }
-    first
+        Some(first_surface(uv, pose_along(view.nodes, share)?, keys.nearest_w, &view.image, ideal))
+    })
 }
 
 /// First intersection of a ray with the surfaces of one ideal frame. The points of the ray, from the nearest
@@ -224,15 +236,25 @@ pub fn gather_silhouette(
     count: u32,
     ideal: &IdealGeometry,
 ) -> DVec3 {
-    let mut sum = DVec3::ZERO;
-    for i in 0..count {
+    mean_of_rays(uv, d_uv, count, |ray, share| {
+        let (key, hit) = first_surface_of_keys(ray, share, keys, ideal)?;
+        Some(keys.views[key].image.color(hit.position_px))
+    })
+}
+
+/// Mean of `count` rays over the area of a pixel and over the exposure. `color` is that of a ray at a share of the
+/// exposure; black without one.
+pub fn mean_of_rays(
+    uv: DVec2,
+    [d_dx, d_dy]: [DVec2; 2],
+    count: u32,
+    color: impl Fn(DVec2, f64) -> Option<DVec3>,
+) -> DVec3 {
+    let of_ray = |i: u32| {
         let (place, share) = subsample(i, count);
-        let ray = uv + place.x * d_uv[0] + place.y * d_uv[1];
-        if let Some((key, hit)) = first_surface_of_keys(ray, share, keys, ideal) {
-            sum += keys.views[key].image.color(hit.position_px);
-        }
-    }
-    sum / f64::from(count.max(1))
+        color(uv + place.x * d_dx + place.y * d_dy, share).unwrap_or(DVec3::ZERO)
+    };
+    (0..count).map(of_ray).sum::<DVec3>() / f64::from(count.max(1))
 }
 
 #[cfg(test)]
@@ -409,9 +431,7 @@ mod tests {
 
     #[test]
     fn nearest_keys_come_first() {
-        let order = |share: f64, count: usize| {
-            (0..count).map(|rank| nearest_key(share, count, rank)).collect::<Vec<_>>()
-        };
+        let order = |share: f64, count: usize| nearest_first(share, count).collect::<Vec<_>>();
         assert_eq!(order(0.1, 2), [0, 1]);
         assert_eq!(order(0.9, 2), [1, 0]);
         assert_eq!(order(0.5, 2), [0, 1]);

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::parabola_through;
+
 /// Nodes of an exposure at which the depth of the key frame is looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -21,6 +23,43 @@ pub enum NodeDepths {
 impl NodeDepths {
     /// All variants, in the order of cost.
     pub const ALL: [Self; 4] = [Self::Mid, Self::Ends, Self::Three, Self::Each];
+
+    /// Gives `add` the number of each of `count` nodes in order, and its inverse depth in the key frame, 1/m. `look_up`
+    /// finds that of a node, or of mid-exposure (`None`), and starts from the result of another if there is one.
+    pub fn of_nodes(
+        self,
+        count: usize,
+        look_up: impl Fn(Option<usize>, Option<f64>) -> f64,
+        mut add: impl FnMut(usize, f64),
+    ) {
+        let Some(last) = count.checked_sub(1) else { return };
+        let share = |node: usize| node as f64 / last.max(1) as f64;
+        match self {
+            Self::Mid => {
+                let middle = look_up(None, None);
+                (0..count).for_each(|node| add(node, middle));
+            }
+            Self::Ends => {
+                let first = look_up(Some(0), None);
+                let change = look_up(Some(last), Some(first)) - first;
+                (0..count).for_each(|node| add(node, first + share(node) * change));
+            }
+            Self::Three => {
+                let middle = look_up(None, None);
+                let [begin, end] = [0, last].map(|node| look_up(Some(node), Some(middle)));
+                let between = parabola_through([begin, middle, end]);
+                (0..count).for_each(|node| add(node, between(share(node))));
+            }
+            Self::Each => {
+                let mut before = None;
+                for node in 0..count {
+                    let found = look_up(Some(node), before);
+                    before = Some(found);
+                    add(node, found);
+                }
+            }
+        }
+    }
 }
 
 /// The curve that joins the nodes of an exposure: polynomials of time, each of which starts at the last node

@@ -1,7 +1,7 @@
 //! The path of a source over the exposure, and the mean of the ideal frame's colour along it. Twin of
 //! `shaders/reverse/gather`.
 
-use camsim_core::temporal::{self, ColorImage, Footprint, NodeDepths, PathStage, parabola_through, path};
+use camsim_core::temporal::{self, ColorImage, Footprint, PathStage, path};
 use camsim_plan::BlurStage;
 use glam::{DVec2, DVec3};
 
@@ -70,41 +70,14 @@ impl Gather {
         (blur, iterations): (BlurStage, u32),
         mut add: impl FnMut(Source),
     ) {
-        let (nodes, mid) = (exposure.nodes, &exposure.mid);
-        let [begin, end] = [0, nodes.len() - 1].map(|node| &nodes[node]);
-        let look_up = |pose, guess| Solver::depth_in_key(uv, pose, guess, iterations, key);
-        let solved = || nodes.iter().step_by(blur.stride as usize);
-        let last = (solved().len() - 1).max(1) as f64;
-        let mut add_all = |in_key: &dyn Fn(f64) -> f64| {
-            for (node, pose) in solved().enumerate() {
-                add(self.solver.source_of_surface(uv, pose, in_key(node as f64 / last), key.ideal));
-            }
+        let node = |k: usize| &exposure.nodes[k * blur.stride as usize];
+        let look_up = |k: Option<usize>, guess: Option<f64>| {
+            Solver::depth_in_key(uv, k.map_or(&exposure.mid, node), guess, iterations, key)
         };
-        match blur.depths {
-            NodeDepths::Mid => {
-                let middle = look_up(mid, None);
-                add_all(&|_| middle);
-            }
-            NodeDepths::Ends => {
-                let first = look_up(begin, None);
-                let change = look_up(end, Some(first)) - first;
-                add_all(&|share| first + share * change);
-            }
-            NodeDepths::Three => {
-                let middle = look_up(mid, None);
-                let parabola =
-                    parabola_through([look_up(begin, Some(middle)), middle, look_up(end, Some(middle))]);
-                add_all(&parabola);
-            }
-            NodeDepths::Each => {
-                let mut guess = None;
-                for pose in solved() {
-                    let in_key = look_up(pose, guess);
-                    guess = Some(in_key);
-                    add(self.solver.source_of_surface(uv, pose, in_key, key.ideal));
-                }
-            }
-        }
+        let solved = exposure.nodes.iter().step_by(blur.stride as usize).len();
+        blur.depths.of_nodes(solved, look_up, |k, in_key| {
+            add(self.solver.source_of_surface(uv, node(k), in_key, key.ideal));
+        });
     }
 
     /// Mean of an image of the ideal frame along a path.

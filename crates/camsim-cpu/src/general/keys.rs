@@ -1,6 +1,6 @@
 //! The ideal frames of an output frame. Twin of `shaders/reverse/keys`.
 
-use camsim_core::temporal::{ColorImage, IdealGeometry, InverseDepthImage, MAX_KEYS};
+use camsim_core::temporal::{ColorImage, IdealGeometry, InverseDepthImage};
 use camsim_plan::FramePlan;
 use glam::{DVec2, DVec3};
 
@@ -79,37 +79,5 @@ impl<'a> Key<'a> {
 
     pub fn ideal(&self) -> &'a IdealGeometry {
         self.depth.ideal
-    }
-}
-
-/// Key frames in order of their distance in time from a share of the window: they stand at the middles of
-/// equal parts of it. Twin of [`camsim_core::temporal::silhouette_rays::nearest_key`].
-pub(super) fn nearest_first(share: f64, count: usize) -> impl Iterator<Item = usize> {
-    let mut used = [false; MAX_KEYS as usize];
-    let distance = move |key: usize| (share * count as f64 - key as f64 - 0.5).abs();
-    (0..count).map(move |_| {
-        let free = (0..count).filter(|&key| !used[key]);
-        let nearest = free.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or_default();
-        used[nearest] = true;
-        nearest
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use camsim_core::temporal::silhouette_rays::nearest_key;
-
-    use super::*;
-
-    #[test]
-    fn keys_are_ordered_as_by_the_twin() {
-        for count in 1..=MAX_KEYS as usize {
-            for step in -10..=30 {
-                let share = f64::from(step) * 0.05;
-                let expected: Vec<_> = (0..count).map(|rank| nearest_key(share, count, rank)).collect();
-                let found: Vec<_> = nearest_first(share, count).collect();
-                assert_eq!(found, expected, "{share} of {count}");
-            }
-        }
     }
 }

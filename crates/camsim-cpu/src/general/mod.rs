@@ -11,7 +11,7 @@ use camsim_core::{
     scenario::Preset,
     scene::linear_from_srgb,
     sequence::Sequence,
-    temporal::{Footprint, IdealGeometry, paper::linear_fog},
+    temporal::{Footprint, IdealGeometry, paper::linear_fog, silhouette_rays::nearest_first},
 };
 use camsim_plan::{FramePlan, RayStage, uniforms::Truth};
 use glam::{DVec2, DVec3};
@@ -28,7 +28,7 @@ mod tests;
 mod truth;
 
 use gather::Gather;
-use keys::{Key, nearest_first};
+use keys::Key;
 use rays::{Ray, Rays};
 use rows::{Exposure, Rows};
 use solver::Solver;

@@ -5,7 +5,7 @@ use camsim_core::temporal::{
     ColorImage, IdealGeometry,
     edge_lines::{EdgeLine, edge_line},
     edge_mask::is_edge,
-    silhouette_rays::{SurfaceHit, march, subsample},
+    silhouette_rays::{SurfaceHit, first_visible, march, mean_of_rays},
     supersampled::{PixelCentre, Supersampled},
 };
 use camsim_plan::{EdgeStage, FramePlan};
@@ -13,12 +13,7 @@ use glam::{DVec2, DVec3};
 use half::f16;
 use rayon::prelude::*;
 
-use super::{
-    IdealImage, Pixel, ReversePass,
-    keys::{Key, nearest_first},
-    rows::Pose,
-    solver::Solver,
-};
+use super::{IdealImage, Pixel, ReversePass, keys::Key, rows::Pose, solver::Solver};
 
 /// Side of the tiles of [`Reach`], ideal pixels.
 const TILE_PX: u32 = 8;
@@ -303,14 +298,10 @@ impl ReversePass<'_> {
         let sees_several =
             silhouette.marked || self.gather.solver.has_parallax() && !self.sees_one_surface(pixel);
         sees_several.then(|| {
-            let color = |i: u32| {
-                let (position, share) = subsample(i, count);
-                let [d_dx, d_dy] = pixel.ray.d_uv;
-                let uv = pixel.ray.uv + position.x * d_dx + position.y * d_dy;
-                self.first_surface_of_keys(pixel, uv, share)
-                    .map_or(DVec3::ZERO, |(image, hit)| image.color(hit.position_px))
-            };
-            (0..count).map(color).sum::<DVec3>() / f64::from(count)
+            mean_of_rays(pixel.ray.uv, pixel.ray.d_uv, count, |uv, share| {
+                let (image, hit) = self.first_surface_of_keys(pixel, uv, share)?;
+                Some(image.color(hit.position_px))
+            })
         })
     }
 
@@ -347,17 +338,12 @@ impl ReversePass<'_> {
     ) -> Option<(&SilhouetteImage<'_>, SurfaceHit)> {
         let [row_share, exposure_share] = self.rows.shares(pixel.position);
         let window_share = row_share + (share - 0.5) * exposure_share;
-        let mut first = None;
-        for number in nearest_first(window_share, self.keys.len()) {
-            let image = self.keys[number].silhouettes.as_ref()?;
+        let (number, hit) = first_visible(window_share, self.keys.len(), |number| {
             let pose = self.rows.exposure(number, pixel.position).pose(share);
-            let hit = self.gather.solver.first_surface(uv, &pose, image);
-            if hit.is_visible {
-                return Some((image, hit));
-            }
-            first = first.or(Some((image, hit)));
-        }
-        first
+            let image = self.keys[number].silhouettes.as_ref()?;
+            Some(self.gather.solver.first_surface(uv, &pose, image))
+        })?;
+        Some((self.keys[number].silhouettes.as_ref()?, hit))
     }
 
     /// Whether the parallax of a pixel's centre ray passes a silhouette at a share of the exposure.

@@ -6,7 +6,7 @@ use camsim_core::{
     temporal::{
         IdealGeometry, InverseDepthImage, KeyDepth,
         displacement::{RK2_STEP_DEG, Twist, linear, rk2},
-        iterate_depth,
+        iterate_depth, row_inverse_depth,
     },
 };
 use camsim_plan::{FramePlan, TemporalStage};
@@ -168,9 +168,7 @@ impl Solver {
     /// Source of a surface with inverse depth `in_key` in the key frame.
     pub fn source_of_surface(&self, uv: DVec2, pose: &Pose, in_key: f64, ideal: &IdealGeometry) -> Source {
         // A surface at or behind the row's image plane has no depth there: infinity replaces it.
-        let scale = 1.0 - pose.shift_m.z * in_key;
-        let direction = pose.rotation * uv.extend(1.0);
-        let w = if scale > MIN_DEPTH_RATIO { in_key * direction.z / scale } else { 0.0 };
+        let w = row_inverse_depth(pose.rotation * uv.extend(1.0), pose.shift_m, in_key).unwrap_or(0.0);
         self.source_at_depth(uv, pose, w, ideal)
     }
 

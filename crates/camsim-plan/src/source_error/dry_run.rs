@@ -11,7 +11,9 @@ use camsim_core::{
     scene::TerrainDetail,
     shutter::Shutter,
     silhouette::steps,
-    temporal::{IdealGeometry, displacement::Twist, parabola_through, plane_inverse_depth},
+    temporal::{
+        IdealGeometry, displacement::Twist, parabola_through, plane_inverse_depth, row_inverse_depth,
+    },
 };
 use glam::{DMat3, DVec2, DVec3};
 
@@ -101,11 +103,7 @@ impl DryRun<'_> {
     /// in the ideal frame.
     pub fn exact_source(&self, probe: &Probe, phase: f64) -> Option<ExactSource> {
         let t_s = self.instant_s(probe, phase + 0.5);
-        let pose = self.path.pose(t_s);
-        let (rotation, shift) = pose.relative_to(self.key_pose);
-        let direction = rotation * probe.uv.extend(1.0);
-        let hit = self.surfaces.first_hit(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
-        let inverse_depth = hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
+        let ((rotation, shift), direction, inverse_depth) = self.seen(probe, t_s);
         let point = direction + inverse_depth * shift;
         let source_px = self.ideal.px_from_point(point);
         if point.z <= 0.0 || !self.ideal.contains(source_px) {
@@ -121,6 +119,15 @@ impl DryRun<'_> {
             direction,
             key_hit: self.surfaces.first_hit(self.key_pose.position_ned_m, self.key_ray(source_px)),
         })
+    }
+
+    /// Of a probe's ray at an instant: the pose of its camera relative to the key camera, its direction there, and the
+    /// inverse planar depth of what it meets in its own camera, 1/m; 0 = sky.
+    fn seen(&self, probe: &Probe, t_s: f64) -> ((DMat3, DVec3), DVec3, f64) {
+        let pose = self.path.pose(t_s);
+        let relative = pose.relative_to(self.key_pose);
+        let hit = self.surfaces.first_hit(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
+        (relative, relative.0 * probe.uv.extend(1.0), hit.map_or(0.0, |hit| 1.0 / hit.depth_m))
     }
 
     /// Source error of each temporal inverse at a probe.
@@ -214,11 +221,8 @@ impl DryRun<'_> {
         if t_s == source.t_s {
             return source.key_inverse_depth;
         }
-        let pose = self.path.pose(t_s);
-        let hit = self.surfaces.first_hit(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
-        let inverse_depth = hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
-        let (rotation, shift) = pose.relative_to(self.key_pose);
-        let z = (rotation * probe.uv.extend(1.0) + inverse_depth * shift).z;
+        let ((_, shift), direction, inverse_depth) = self.seen(probe, t_s);
+        let z = (direction + inverse_depth * shift).z;
         if z > 0.0 { inverse_depth / z } else { 0.0 }
     }
 
@@ -252,11 +256,8 @@ impl DryRun<'_> {
     /// Source at a share of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth
     /// in the row's camera.
     pub fn true_source_px(&self, probe: &Probe, share: f64) -> (DVec2, f64) {
-        let pose = self.path.pose(self.instant_s(probe, share));
-        let hit = self.surfaces.first_hit(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
-        let inverse_depth = hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
-        let (rotation, shift) = pose.relative_to(self.key_pose);
-        (self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + inverse_depth * shift), inverse_depth)
+        let ((_, shift), direction, inverse_depth) = self.seen(probe, self.instant_s(probe, share));
+        (self.ideal.px_from_point(direction + inverse_depth * shift), inverse_depth)
     }
 
     /// How far polynomial `k` of the exposure's path is from where the probe looks; 0 where its ray passes a
@@ -329,10 +330,4 @@ impl ExactSource {
     pub fn is_hidden(&self) -> bool {
         self.key_hit.is_some_and(|hit| self.key_inverse_depth * hit.depth_m < 1.0 - HIDDEN)
     }
-}
-
-/// As [`camsim_core::temporal::reproject`]: `None` at or behind the row's own image plane.
-fn row_inverse_depth(direction: DVec3, shift: DVec3, found: f64) -> Option<f64> {
-    let scale = 1.0 - shift.z * found;
-    (scale > 1e-3).then(|| found * direction.z / scale)
 }
