@@ -69,6 +69,19 @@ impl Shape {
             .collect()
     }
 
+    /// Box around each triangle in the shape's own axes, wide enough for rays that are rounded there.
+    #[must_use]
+    pub fn triangle_boxes(&self) -> Vec<Aabb> {
+        let of_triangle = |corners: &[u32]| {
+            let mut bounds = Aabb::EMPTY;
+            let corners = corners.iter().filter_map(|&corner| self.vertices.get(corner as usize));
+            corners.for_each(|vertex| bounds.include(DVec3::from_array(vertex.position_m.map(f64::from))));
+            let hair = 1e-9 * bounds.min.abs().max(bounds.max.abs()).max_element();
+            Aabb { min: bounds.min - hair, max: bounds.max + hair }
+        };
+        self.indices.chunks_exact(3).map(of_triangle).collect()
+    }
+
     /// Bounding box of the vertices in the shape's own axes.
     pub fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;

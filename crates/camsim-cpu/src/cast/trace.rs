@@ -92,7 +92,7 @@ impl SceneTrees {
         let bounds: Vec<Aabb> = scene.mesh_bounds().into_iter().zip(&scene.meshes).map(still).collect();
         let mut tree = |mesh: &Mesh| {
             let shape = &mesh.shape;
-            known.entry(Arc::as_ptr(shape)).or_insert_with(|| Arc::new(shape_tree(shape))).clone()
+            known.entry(Arc::as_ptr(shape)).or_insert_with(|| Arc::new(RayBvh::new(&shape.triangle_boxes()))).clone()
         };
         Self {
             meshes: RayBvh::new(&bounds),
@@ -238,20 +238,6 @@ impl Hits {
 fn has_depth(mesh: &Mesh, hit: &MeshHit) -> bool {
     let reaches = |cutoff: f32| mesh.alpha_at(hit.corners, hit.weights) >= f64::from(cutoff);
     mesh.material.cutoff.is_none_or(reaches)
-}
-
-fn shape_tree(shape: &Shape) -> RayBvh {
-    let triangle = |corners: &[u32]| {
-        let mut bounds = Aabb::EMPTY;
-        let position = |&corner: &u32| {
-            shape.vertices.get(corner as usize).map(|v| DVec3::from_array(v.position_m.map(f64::from)))
-        };
-        corners.iter().filter_map(position).for_each(|corner| bounds.include(corner));
-        // A ray in the shape's axes is rounded.
-        let margin = 1e-9 * bounds.min.abs().max(bounds.max.abs()).max_element();
-        Aabb { min: bounds.min - margin, max: bounds.max + margin }
-    };
-    RayBvh::new(&shape.indices.chunks_exact(3).map(triangle).collect::<Vec<_>>())
 }
 
 /// The triangle of the terrain that a ray has met.

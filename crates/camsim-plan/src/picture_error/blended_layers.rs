@@ -44,7 +44,7 @@ pub(crate) struct BlendSearch<'a> {
 impl BlendSearch<'_> {
     /// The error over the picture; `None` where nothing in the scene is blended.
     pub fn error(&self) -> Option<BlendedDepthError> {
-        if !self.surfaces.blends() {
+        if !self.surfaces.blends {
             return None;
         }
         let probes = &self.reach.probes;

@@ -304,7 +304,7 @@ impl<'a> Draft<'a> {
                 self.skip("depth read by the reverse pipeline", "no stage of this frame uses it");
             }
         }
-        if !inputs.scene.surfaces.blends() {
+        if !inputs.scene.surfaces.blends {
             self.skip("blending of surfaces", "no surface of the scene is blended");
         }
         match inputs.sequence.scene.light {
@@ -327,7 +327,7 @@ impl<'a> Draft<'a> {
         let middle_s = 0.5 * (window_s[0] + window_s[1]);
         let span_s = context.path().span_s();
         let camera = &context.reach.camera;
-        let has_no_reach = inputs.scene.surfaces.blends();
+        let has_no_reach = inputs.scene.surfaces.blends;
         let mut plan = FramePlan {
             frame: context.frame,
             preset: context.quality().preset,

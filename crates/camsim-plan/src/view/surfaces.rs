@@ -90,20 +90,7 @@ impl Surfaces {
     pub fn new(scene: Arc<Scene>) -> Self {
         let mut known: HashMap<*const Shape, Arc<ShapeTrees>> = HashMap::new();
         let tree_of = |shape: &Shape| {
-            let triangle = |corners: &[u32]| {
-                let mut bounds = Aabb::EMPTY;
-                let position = |&v: &u32| {
-                    shape
-                        .vertices
-                        .get(v as usize)
-                        .map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)))
-                };
-                corners.iter().filter_map(position).for_each(|corner| bounds.include(corner));
-                // A ray in the shape's axes is rounded.
-                let hair = 1e-9 * bounds.min.abs().max(bounds.max.abs()).max_element();
-                Aabb { min: bounds.min - hair, max: bounds.max + hair }
-            };
-            let boxes: Vec<Aabb> = shape.indices.chunks_exact(3).map(triangle).collect();
+            let boxes = shape.triangle_boxes();
             Arc::new(ShapeTrees { for_rays: RayBvh::new(&boxes), boxes: ProximityBvh::new(&boxes) })
         };
         let shapes = scene.meshes.iter().map(|mesh| {
@@ -164,11 +151,6 @@ impl Surfaces {
     /// Whether there is anything but ground and pictures on it.
     pub fn has_models(&self) -> bool {
         self.blends || self.scene.meshes.iter().any(|mesh| mesh.shape.indices.len() > 6)
-    }
-
-    /// Whether any surface is blended.
-    pub fn blends(&self) -> bool {
-        self.blends
     }
 
     /// First surface along `origin + t direction`, t >= 0.

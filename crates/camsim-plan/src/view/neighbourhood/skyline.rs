@@ -124,7 +124,7 @@ impl NeighbourhoodSearch<'_> {
             points: places.into_iter().flatten().map(|point| (times, point)).collect(),
             across_px,
             focal_px: self.reach.camera.central_focal_px(),
-            reach_px: if self.surfaces.blends() { 0.0 } else { SKY_REACH_PX },
+            reach_px: if self.surfaces.blends { 0.0 } else { SKY_REACH_PX },
         }
     }
 

@@ -194,7 +194,7 @@ impl<'a> PointLine<'a> {
             let is_crease = self.either(k, |depths| bends(depths, APART_PX * FINE_EDGE_STEP));
             let side = if is_crease { &mut sums.creases2 } else { &mut sums.touching2 };
             *side += self.contrast2(k, k + 1);
-        } else if self.search.surfaces.blends() && self.light(k).panes != self.light(k + 1).panes {
+        } else if self.search.surfaces.blends && self.light(k).panes != self.light(k + 1).panes {
             // The border of a blended surface, which has no depth of its own.
             sums.touching2 += self.contrast2(k, k + 1);
         } else if is_on_terrain(from, to) {
