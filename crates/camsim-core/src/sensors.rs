@@ -126,18 +126,10 @@ impl Sensors {
     pub fn new(scenario: &Scenario, input: &SensorInput) -> Result<Self, SensorError> {
         let seed = scenario.seed;
         Ok(Self {
-            imus: scenario.imu.iter().map(|spec| Imu::new(spec, seed, input)).collect::<Result<_, _>>()?,
-            gnss: scenario.gnss.iter().map(|spec| Gnss::new(spec, seed, input)).collect::<Result<_, _>>()?,
-            barometers: scenario
-                .barometer
-                .iter()
-                .map(|spec| Barometer::new(spec, seed, input))
-                .collect::<Result<_, _>>()?,
-            magnetometers: scenario
-                .magnetometer
-                .iter()
-                .map(|spec| Magnetometer::new(spec, seed, input))
-                .collect::<Result<_, _>>()?,
+            imus: all(&scenario.imu, |spec| Imu::new(spec, seed, input))?,
+            gnss: all(&scenario.gnss, |spec| Gnss::new(spec, seed, input))?,
+            barometers: all(&scenario.barometer, |spec| Barometer::new(spec, seed, input))?,
+            magnetometers: all(&scenario.magnetometer, |spec| Magnetometer::new(spec, seed, input))?,
         })
     }
 
@@ -149,6 +141,13 @@ impl Sensors {
             && self.barometers.is_empty()
             && self.magnetometers.is_empty()
     }
+}
+
+fn all<Spec, Sensor>(
+    specs: &[Spec],
+    new: impl Fn(&Spec) -> Result<Sensor, SensorError>,
+) -> Result<Vec<Sensor>, SensorError> {
+    specs.iter().map(new).collect()
 }
 
 /// The span of a scenario's sensors: the flown window, all exposures of its frames, and [`LEAD_S`] before and
@@ -188,6 +187,12 @@ impl SensorInput {
         let earth = Earth::new(frame, frame_heights(scenario));
         let span_s = span_s(scenario, last_row_s);
         Self { trajectory, earth, epoch_ns, span_s, camera_mount: scenario.camera.mount.clone() }
+    }
+
+    /// That the place of the local frame on Earth is known, which `reason` needs.
+    fn check_place(&self, kind: &'static str, name: &str, reason: &'static str) -> Result<(), SensorError> {
+        let no_place = || SensorError::NoPlace { kind, name: name.to_owned(), reason };
+        self.earth.frame().map(|_| ()).ok_or_else(no_place)
     }
 }
 

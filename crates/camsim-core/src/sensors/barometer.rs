@@ -20,7 +20,8 @@ pub struct Barometer {
     pub mount: SensorMount,
     /// Its clock.
     pub clock: SampleClock,
-    input: SensorInput,
+    /// What the samples are made from.
+    pub input: SensorInput,
     errors: AxisErrors,
 }
 
@@ -45,10 +46,7 @@ impl Barometer {
     pub(super) fn new(spec: &BarometerSpec, seed: u64, input: &SensorInput) -> Result<Self, SensorError> {
         let keys = [spec.rate_hz, spec.clock_offset_ms, spec.jitter_ms];
         let clock = SampleClock::new(("barometer", &spec.name), keys, seed, input)?;
-        if input.earth.frame().is_none() {
-            let name = spec.name.clone();
-            return Err(SensorError::NoPlace { kind: "barometer", name, reason: "the height" });
-        }
+        input.check_place("barometer", &spec.name, "the height")?;
         let figures = ErrorFigures {
             white: DVec3::X * spec.sigma_pa,
             bias: DVec3::X * spec.bias_pa,
@@ -81,11 +79,5 @@ impl Barometer {
             let altitude_m = atmosphere::isa_altitude_m(pressure_pa);
             BarometerSample { time, pressure_pa, altitude_m, true_pressure_pa, true_msl_m, bias_pa }
         })
-    }
-
-    /// What the samples are made from.
-    #[must_use]
-    pub fn input(&self) -> &SensorInput {
-        &self.input
     }
 }

@@ -22,7 +22,8 @@ pub struct Gnss {
     pub mount: SensorMount,
     /// Its clock.
     pub clock: SampleClock,
-    input: SensorInput,
+    /// What the samples are made from.
+    pub input: SensorInput,
     position: AxisErrors,
     velocity: AxisErrors,
     dropouts: Dropouts,
@@ -99,10 +100,7 @@ impl Gnss {
     pub(super) fn new(spec: &GnssSpec, seed: u64, input: &SensorInput) -> Result<Self, SensorError> {
         let keys = [spec.rate_hz, spec.clock_offset_ms, spec.jitter_ms];
         let clock = SampleClock::new(("gnss", &spec.name), keys, seed, input)?;
-        if input.earth.frame().is_none() {
-            let name = spec.name.clone();
-            return Err(SensorError::NoPlace { kind: "gnss", name, reason: "latitude and longitude" });
-        }
+        input.check_place("gnss", &spec.name, "latitude and longitude")?;
         let normals = Normals::new(seed, &spec.name);
         let position = ErrorFigures {
             white: axes(spec.sigma_m),
@@ -155,12 +153,6 @@ impl Gnss {
             let available_ns = time.stamp_ns.saturating_add(delay_ns);
             Some(GnssSample { time, available_ns, fix: measured, truth })
         })
-    }
-
-    /// What the samples are made from.
-    #[must_use]
-    pub fn input(&self) -> &SensorInput {
-        &self.input
     }
 }
 

@@ -38,7 +38,8 @@ pub struct Imu {
     shaking: Option<ShakingPart>,
     /// Its clock.
     pub clock: SampleClock,
-    input: SensorInput,
+    /// What the samples are made from.
+    pub input: SensorInput,
     earth_rate_ned_rad_s: DVec3,
     gyro: Triad,
     accel: Triad,
@@ -189,11 +190,5 @@ impl Imu {
     #[must_use]
     pub fn matrices(&self) -> [DMat3; 2] {
         [self.gyro.matrix, self.accel.matrix]
-    }
-
-    /// What the samples are made from.
-    #[must_use]
-    pub fn input(&self) -> &SensorInput {
-        &self.input
     }
 }

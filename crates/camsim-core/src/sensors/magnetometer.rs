@@ -32,7 +32,8 @@ pub struct Magnetometer {
     pub mount: SensorMount,
     /// Its clock.
     pub clock: SampleClock,
-    input: SensorInput,
+    /// What the samples are made from.
+    pub input: SensorInput,
     field: Field,
     soft_iron: DMat3,
     hard_iron_ut: DVec3,
@@ -105,9 +106,8 @@ impl Magnetometer {
     pub(super) fn new(spec: &MagnetometerSpec, seed: u64, input: &SensorInput) -> Result<Self, SensorError> {
         let keys = [spec.rate_hz, spec.clock_offset_ms, spec.jitter_ms];
         let clock = SampleClock::new(("magnetometer", &spec.name), keys, seed, input)?;
-        if spec.field_ned_ut.is_none() && input.earth.frame().is_none() {
-            let name = spec.name.clone();
-            return Err(SensorError::NoPlace { kind: "magnetometer", name, reason: "date" });
+        if spec.field_ned_ut.is_none() {
+            input.check_place("magnetometer", &spec.name, "date")?;
         }
         let no_field = |problem| SensorError::NoField { name: spec.name.clone(), problem };
         let field = Field::of(spec).map_err(no_field)?;
@@ -139,11 +139,5 @@ impl Magnetometer {
             let mag_ut = DVec3::from_array(value.to_array().map(|axis| read_out(axis, step, range)));
             MagnetometerSample { time, mag_ut, true_mag_ut, field_ned_ut }
         })
-    }
-
-    /// What the samples are made from.
-    #[must_use]
-    pub fn input(&self) -> &SensorInput {
-        &self.input
     }
 }

@@ -87,12 +87,12 @@ impl<'a> Description<'a> {
                     kind: $kind,
                     rate_hz: one.clock.rate_hz(),
                     mount: one.mount,
-                    input: one.input(),
+                    input: &one.input,
                     matrices: None,
                     noise: None,
                     spec: Spec::$spec(&one.spec),
                     write_table: Box::new(move |path| {
-                        write_table(path, one.input(), one.samples(), |row| (row.time, $is_flagged(row)))
+                        write_table(path, &one.input, one.samples(), |row| (row.time, $is_flagged(row)))
                     }),
                 })
             };
