@@ -26,78 +26,73 @@ const NANO: &str = "Teledyne DALSA Genie Nano M2450 manual, page 42, easymanua.l
 const HERB: &str = "fhotolab.fherb.de, 7 September 2016 (second hand)";
 const MENGINEER: &str = "Point Grey GS3-PGE-50S5M, by mengineer.hatenablog.com, 2 May 2016 (second hand)";
 
-/// The facts of a model. Each number stands in its source, or follows from two of its numbers by the
+/// The facts of each model. Each number stands in its source, or follows from two of its numbers by the
 /// definitions of EMVA 1288: the full well is `10^(SNRmax/10)`, and the read noise
 /// `full well / 10^(DR/20) - 1/2`.
-///
-/// What is not listed no source states: it is 0, or has to be given.
+const FACTS: [(SensorModel, &[Fact]); 6] = [
+    (
+        SensorModel::Icx625,
+        &[
+            fact("quantum_efficiency", 0.57, MENGINEER),
+            fact("read_noise_e", 8.28, MENGINEER),
+            fact("full_well_e", 5903.0, MENGINEER),
+        ],
+    ),
+    (
+        SensorModel::Imx174,
+        &[
+            fact("pixel_um", 5.86, HERB),
+            fact("quantum_efficiency", 0.77, HERB),
+            fact("read_noise_e", 6.83, HERB),
+            fact("full_well_e", 32_691.0, HERB),
+        ],
+    ),
+    // 45.1 dB, 73 dB.
+    (
+        SensorModel::Imx249,
+        &[
+            fact("pixel_um", 5.86, MV_2024A),
+            fact("full_well_e", 32_359.0, MV_2024A),
+            fact("read_noise_e", 6.74, MV_2024A),
+            fact("bits", 12.0, MV_2024A),
+        ],
+    ),
+    // 40.3 dB, 71.2 dB.
+    (
+        SensorModel::Imx250,
+        &[
+            fact("pixel_um", 3.45, MV_2051),
+            fact("full_well_e", 10_700.0, NANO),
+            fact("read_noise_e", 2.45, MV_2051),
+            fact("bits", 12.0, MV_2051),
+        ],
+    ),
+    // 40.3 dB, 71.3 dB.
+    (
+        SensorModel::Imx255,
+        &[
+            fact("pixel_um", 3.45, MV_IMX255),
+            fact("full_well_e", 10_715.0, MV_IMX255),
+            fact("read_noise_e", 2.42, MV_IMX255),
+            fact("bits", 12.0, MV_IMX255),
+        ],
+    ),
+    // 40.2 dB, 71.4 dB.
+    (
+        SensorModel::Imx273,
+        &[
+            fact("pixel_um", 3.45, MV_2016),
+            fact("full_well_e", 10_471.0, MV_2016),
+            fact("read_noise_e", 2.32, MV_2016),
+            fact("bits", 12.0, MV_2016),
+        ],
+    ),
+];
+
+/// The facts of a model. What is not listed no source states: it is 0, or has to be given.
 #[must_use]
 pub fn facts(model: SensorModel) -> &'static [Fact] {
-    match model {
-        SensorModel::Icx625 => {
-            const {
-                &[
-                    fact("quantum_efficiency", 0.57, MENGINEER),
-                    fact("read_noise_e", 8.28, MENGINEER),
-                    fact("full_well_e", 5903.0, MENGINEER),
-                ]
-            }
-        }
-        SensorModel::Imx174 => {
-            const {
-                &[
-                    fact("pixel_um", 5.86, HERB),
-                    fact("quantum_efficiency", 0.77, HERB),
-                    fact("read_noise_e", 6.83, HERB),
-                    fact("full_well_e", 32_691.0, HERB),
-                ]
-            }
-        }
-        // 45.1 dB, 73 dB.
-        SensorModel::Imx249 => {
-            const {
-                &[
-                    fact("pixel_um", 5.86, MV_2024A),
-                    fact("full_well_e", 32_359.0, MV_2024A),
-                    fact("read_noise_e", 6.74, MV_2024A),
-                    fact("bits", 12.0, MV_2024A),
-                ]
-            }
-        }
-        // 40.3 dB, 71.2 dB.
-        SensorModel::Imx250 => {
-            const {
-                &[
-                    fact("pixel_um", 3.45, MV_2051),
-                    fact("full_well_e", 10_700.0, NANO),
-                    fact("read_noise_e", 2.45, MV_2051),
-                    fact("bits", 12.0, MV_2051),
-                ]
-            }
-        }
-        // 40.3 dB, 71.3 dB.
-        SensorModel::Imx255 => {
-            const {
-                &[
-                    fact("pixel_um", 3.45, MV_IMX255),
-                    fact("full_well_e", 10_715.0, MV_IMX255),
-                    fact("read_noise_e", 2.42, MV_IMX255),
-                    fact("bits", 12.0, MV_IMX255),
-                ]
-            }
-        }
-        // 40.2 dB, 71.4 dB.
-        SensorModel::Imx273 => {
-            const {
-                &[
-                    fact("pixel_um", 3.45, MV_2016),
-                    fact("full_well_e", 10_471.0, MV_2016),
-                    fact("read_noise_e", 2.32, MV_2016),
-                    fact("bits", 12.0, MV_2016),
-                ]
-            }
-        }
-    }
+    FACTS.iter().find(|(of, _)| *of == model).map_or(&[], |(_, facts)| facts)
 }
 
 /// The keys of a sensor with the facts of its model where a key is not given.
@@ -120,18 +115,9 @@ pub fn with_facts(spec: &ImageSensorSpec) -> ImageSensorSpec {
 mod tests {
     use super::*;
 
-    const ALL: [SensorModel; 6] = [
-        SensorModel::Icx625,
-        SensorModel::Imx174,
-        SensorModel::Imx249,
-        SensorModel::Imx250,
-        SensorModel::Imx255,
-        SensorModel::Imx273,
-    ];
-
     #[test]
     fn facts_fill_what_is_not_given() {
-        for model in ALL {
+        for &model in SensorModel::ALL {
             let spec = with_facts(&ImageSensorSpec { model: Some(model), ..ImageSensorSpec::default() });
             assert!(spec.full_well_e.is_some() && spec.read_noise_e.is_some(), "{model:?}");
             assert!(facts(model).iter().all(|fact| !fact.source.is_empty() && fact.value > 0.0));

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{
     Oracle, RaySample,
     flow::FlowPicture,
-    plane_errors::{Compared, beside_offsets},
+    plane_errors::{Compared, at_share, beside_offsets},
 };
 use crate::{
     frame::RenderedFrame,
@@ -163,10 +163,7 @@ fn errors_of(channel: Channel, of_pixels: u64, pixels: &[PixelError]) -> FlowErr
         let of = || pixels.iter().filter(move |pixel| pixel.is_away == is_away);
         let mut errors: Vec<f64> = of().filter_map(|pixel| pixel.error).collect();
         errors.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| {
-            let last = errors.len().saturating_sub(1);
-            errors.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
-        };
+        let at = |share: f64| at_share(&errors, share);
         FlowStats {
             pixels: errors.len() as u64,
             p50: at(0.5),

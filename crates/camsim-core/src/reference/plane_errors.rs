@@ -151,10 +151,7 @@ impl<'a> Compared<'a> {
         let pixels: Vec<PixelError> = (0..self.samples.len()).into_par_iter().filter_map(of_pixel).collect();
         let mut sorted: Vec<f64> = pixels.iter().map(|pixel| pixel.error).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| {
-            let last = sorted.len().saturating_sub(1);
-            sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
-        };
+        let at = |share: f64| at_share(&sorted, share);
         let number =
             |counts: &dyn Fn(&PixelError) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
         Some(PlaneErrors {
@@ -231,6 +228,12 @@ impl<'a> Compared<'a> {
             .filter(move |[x, y]| (0..width).contains(x) && (0..height).contains(y))
             .map(move |[x, y]| (y * width + x) as usize)
     }
+}
+
+/// The error at a share of sorted ones; 0 without any.
+pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1);
+    sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
 }
 
 fn is_beyond(channel: Channel, error: f64) -> bool {
