@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use anyhow::anyhow;
 use camsim_core::{
+    deferred_photometric::DeferredPhotometric,
     imaging::{ImageSensor, Optics},
-    late_photometric::LatePhotometric,
     reference::{Oracle, RenderOptions},
     scenario::{Auto, Preset, Primary, Scenario, Solver},
     scene::LodSelection,
@@ -140,7 +140,7 @@ pub struct ReferenceSource {
     /// One; or one a face, or one of each colour of each face.
     oracles: Vec<Oracle>,
     /// These three are for what parts are joined to; a single oracle has its own.
-    late: Option<LatePhotometric>,
+    late: Option<DeferredPhotometric>,
     optics: Option<Optics>,
     sensor: Option<ImageSensor>,
     planner: Planner,
@@ -170,7 +170,7 @@ impl ReferenceSource {
         };
         let oracles = parts.into_iter().map(Oracle::new).collect::<Result<_, _>>().or_bad_input()?;
         let sensor = ImageSensor::new(&scenario.camera, scenario.seed);
-        let late = LatePhotometric::new(sequence);
+        let late = DeferredPhotometric::new(sequence);
         let optics = Optics::new(&scenario.camera, scenario.seed);
         Ok(Self { oracles, late, optics, sensor, planner, options })
     }

@@ -31,7 +31,7 @@
 //! | [`timing_faults`] | late triggers, wrong stamps, dropped and doubled frames |
 //! | [`sequence`] | a loaded scenario |
 //! | [`temporal`] | temporal inverse and gather: from an output ray to its source in an ideal frame |
-//! | [`photometric`], [`vignetting`], [`noise`], [`late_photometric`] | vignette, gain, noise, saturation |
+//! | [`photometric`], [`vignetting`], [`noise`], [`deferred_photometric`] | vignette, gain, noise, saturation |
 //! | [`exposure`], [`auto_exposure`] | exposure time and gain of each frame; exposures that follow the pictures |
 //! | [`imaging`] | the lens as a blur; the image sensor: electrons, digital numbers, mosaics |
 //! | [`mtf`] | transfer function of a picture, from a slanted edge |
@@ -64,13 +64,13 @@ pub use camsim_scenario as scenario;
 pub mod apply;
 pub mod auto_exposure;
 pub mod camera;
+pub mod deferred_photometric;
 pub mod distribution;
 pub mod exposure;
 pub mod flight_log;
 pub mod frame;
 pub mod geodesy;
 pub mod imaging;
-pub mod late_photometric;
 pub mod lens;
 pub mod metrics;
 pub mod mount;

@@ -35,15 +35,15 @@ impl Photometry {
     /// The light as it is.
     const NEUTRAL: Self = Self { light: 1.0, noise_sigma: 0.0, is_mono: false, most: f32::MAX };
 
-    /// What the passes apply: nothing where that comes later ([`CameraSpec::is_finished_late`]).
+    /// What the passes apply: nothing where that comes later ([`CameraSpec::defers_photometric`]).
     #[must_use]
     pub fn new(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
-        if camera.is_finished_late() { Self::NEUTRAL } else { Self::before_spread(camera, exposure) }
+        if camera.defers_photometric() { Self::NEUTRAL } else { Self::before_point_spread(camera, exposure) }
     }
 
     /// What comes before the point spread: with one, the vignette alone.
     #[must_use]
-    pub fn before_spread(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
+    pub fn before_point_spread(camera: &CameraSpec, exposure: Option<&FrameExposure>) -> Self {
         if camera.point_spread.is_some() { Self::NEUTRAL } else { Self::whole(camera, exposure) }
     }
 

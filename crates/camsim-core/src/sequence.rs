@@ -154,11 +154,11 @@ impl Sequence {
     }
 
     /// Weights of the light at every pixel in the passes, and the size of their picture; a single 1 without any,
-    /// and where they come later ([`crate::scenario::CameraSpec::is_finished_late`]).
+    /// and where they come later ([`crate::scenario::CameraSpec::defers_photometric`]).
     #[must_use]
     pub fn vignette_weights(&self) -> ([u32; 2], Vec<f32>) {
         let camera = &self.scenario.camera;
-        let weights = match camera.is_finished_late() {
+        let weights = match camera.defers_photometric() {
             true => None,
             false => self.light_weights(Primary::Green),
         };

@@ -470,10 +470,7 @@ mod tests {
     fn listed_knots_are_found_and_faults_refused() {
         let times = vec![0.0, 1.0, 1.00005, 4.0];
         let knots: Vec<_> = (0..4)
-            .map(|k| BodyState {
-                position_ned_m: DVec3::splat(f64::from(k)),
-                ..BodyState::default()
-            })
+            .map(|k| BodyState { position_ned_m: DVec3::splat(f64::from(k)), ..BodyState::default() })
             .collect();
         let trajectory = Trajectory::listed(times.clone(), 4.0, knots.clone()).unwrap();
         for (t_s, expected) in [

@@ -50,7 +50,7 @@ pub(crate) struct IdealCache {
 }
 
 /// Turns what a face's frame says in the face's axes to those of the whole camera: planar depth, normals.
-pub(crate) fn in_whole_camera(frame: &mut RenderedFrame, plan: &FramePlan) {
+pub(crate) fn turn_to_camera_axes(frame: &mut RenderedFrame, plan: &FramePlan) {
     let Some(face) = plan.camera.lens.face() else { return };
     let whole_from_face = face.camera_from_face();
     let width = frame.size_px[0] as usize;
@@ -81,7 +81,7 @@ pub(crate) fn in_whole_camera(frame: &mut RenderedFrame, plan: &FramePlan) {
 pub fn join_parts(parts: impl IntoIterator<Item = Finished>) -> Option<Finished> {
     let mut whole: Option<Finished> = None;
     for mut part in parts {
-        in_whole_camera(&mut part.frame, &part.plan);
+        turn_to_camera_axes(&mut part.frame, &part.plan);
         add_part(&mut whole, part);
     }
     whole.map(joined)

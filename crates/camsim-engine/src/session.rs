@@ -3,9 +3,9 @@
 use std::{collections::VecDeque, sync::Arc, time::Instant};
 
 use camsim_core::{
+    deferred_photometric::DeferredPhotometric,
     frame::{Plane, RenderedFrame},
     imaging::{ImageSensor, Optics},
-    late_photometric::LatePhotometric,
     scenario::{Channel, Preset, Primary, Scenario},
     scene::{LodSelection, SceneBatches},
     sequence::Sequence,
@@ -24,7 +24,7 @@ use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
     finished,
-    lane::{IdealCache, IdealKey, Lane, add_part, in_whole_camera, joined},
+    lane::{IdealCache, IdealKey, Lane, add_part, joined, turn_to_camera_axes},
     moving::{Lamps, MovingScene},
     planner_threads,
     prepare_ahead::{Job, PrepareAhead, Prepared, Preparer, ms_since},
@@ -47,7 +47,7 @@ pub struct Session<'a> {
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
     optics: Option<Optics>,
-    late: Option<LatePhotometric>,
+    late: Option<DeferredPhotometric>,
     sensor: Option<ImageSensor>,
 }
 
@@ -96,7 +96,7 @@ impl<'a> Session<'a> {
         let Scenario { camera, seed, .. } = &still.scenario;
         let optics = Optics::new(camera, *seed);
         let sensor = ImageSensor::new(camera, *seed);
-        let late = LatePhotometric::new(&still);
+        let late = DeferredPhotometric::new(&still);
         Ok(Self {
             engine,
             lanes: lanes(&planner, scene_planner.as_deref(), moving, &[]),
@@ -142,7 +142,7 @@ impl<'a> Session<'a> {
         let Scenario { camera, seed, .. } = &still.scenario;
         self.optics = Optics::renewed(self.optics.take(), camera, *seed);
         self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
-        self.late = LatePhotometric::new(&still);
+        self.late = DeferredPhotometric::new(&still);
         self.cpu.renew(still);
         self.lanes = lanes(&planner, scene_planner.as_deref(), moving, &self.lanes);
         self.planner = planner;
@@ -273,7 +273,7 @@ impl<'a> Session<'a> {
             renderer: plan.placement.ideal,
         };
         // Red and blue are made from the ideal frame that green has just been.
-        let is_drawn = is_beside_green(plan);
+        let is_drawn = is_red_or_blue(plan);
         let redraws = lane.ideal.as_ref().is_none_or(|ideal| !is_drawn && ideal.key != key);
         let mut times = FrameTimes { plan_ms: prepared.plan_ms, ..FrameTimes::default() };
         if redraws {
@@ -392,7 +392,7 @@ impl<'a> Session<'a> {
         mut truth: Option<Vec<Truth>>,
     ) -> Result<RenderedFrame, PlanError> {
         let sequence = self.planner.lane(lane).sequence().clone();
-        let is_other = is_beside_green(plan);
+        let is_other = is_red_or_blue(plan);
         let whole = self.scene_planner().lane(lane).sequence().clone();
         self.lanes[lane].missed.paint(&mut color_rgba, truth.as_mut(), plan, &whole);
         if let Some(moving) = &self.lanes[lane].moving {
@@ -418,7 +418,7 @@ impl<'a> Session<'a> {
             raw: None,
         };
         if self.lanes.len() > 1 {
-            in_whole_camera(&mut frame, plan);
+            turn_to_camera_axes(&mut frame, plan);
         }
         Ok(frame)
     }
@@ -474,7 +474,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Faults of the adapter.
-    pub fn triangles_near_marks(&self) -> Result<Option<u64>, GpuError> {
+    pub fn triangles_near_edges(&self) -> Result<Option<u64>, GpuError> {
         self.gpu.as_ref().map_or(Ok(None), |gpu| gpu.triangles_near_edges())
     }
 
@@ -526,6 +526,6 @@ impl Parts {
 }
 
 /// Whether it is a pass that red or blue has beside that of green.
-fn is_beside_green(plan: &FramePlan) -> bool {
+fn is_red_or_blue(plan: &FramePlan) -> bool {
     matches!(plan.primary, Some(Primary::Red | Primary::Blue))
 }

@@ -220,7 +220,7 @@ fn only_triangles_near_silhouettes_are_multisampled() {
         Ok(())
     };
     session.render::<std::convert::Infallible>([0], &mut count).expect("render");
-    let near = session.triangles_near_marks().expect("readable").expect("drawn");
+    let near = session.triangles_near_edges().expect("readable").expect("drawn");
     eprintln!("{near} of {all} triangles");
     assert!(near > 0 && 2 * near < all, "{near} of {all}");
 }

@@ -13,10 +13,10 @@ mod georeference;
 mod grid_tiles;
 mod height_files;
 mod height_unit;
-mod hillshade;
 mod metadata;
 mod ortho;
 pub(crate) mod raster;
+mod shaded_relief;
 mod sidecar;
 mod stated_crs;
 mod tiff_file;
@@ -339,7 +339,7 @@ pub fn read_terrain_in_light(
             ortho.texture.clone()
         }
         // Hypsometric tints are hillshaded unless the scene has light.
-        None => hillshade::shaded_relief(
+        None => shaded_relief::shaded_relief(
             dem.size,
             heights.range_m,
             &|post| dem.height_m(post),

@@ -217,7 +217,7 @@ impl CameraSpec {
     /// Whether the photometric stage needs all colours of a pixel at once, so that it comes after the passes:
     /// gains that differ between colours, or luminance of three lenses.
     #[must_use]
-    pub fn is_finished_late(&self) -> bool {
+    pub fn defers_photometric(&self) -> bool {
         let vignetting = self.photometric.vignetting.as_ref();
         let is_grey = matches!(self.photometric.output, OutputEncoding::Luma8 | OutputEncoding::Luma16);
         let is_chromatic = self.chromatic.as_ref().is_some_and(ChromaticSpec::differs);
@@ -275,11 +275,11 @@ mod tests {
     #[test]
     fn luminance_of_three_lenses_and_colored_gains_come_late() {
         let mut camera = chromatic();
-        assert!(!camera.is_finished_late());
+        assert!(!camera.defers_photometric());
         camera.photometric.output = OutputEncoding::Luma8;
-        assert!(camera.is_finished_late() && camera.of_primary(Primary::Red).is_finished_late());
+        assert!(camera.defers_photometric() && camera.of_primary(Primary::Red).defers_photometric());
         let vignetting = VignettingSpec { polynomial_red: Some(vec![-0.1]), ..VignettingSpec::default() };
         let photometric = PhotometricSpec { vignetting: Some(vignetting), ..PhotometricSpec::default() };
-        assert!(CameraSpec { photometric, ..CameraSpec::default() }.is_finished_late());
+        assert!(CameraSpec { photometric, ..CameraSpec::default() }.defers_photometric());
     }
 }

@@ -194,9 +194,7 @@ fn window(camera: &CameraSpec) -> Result<(CameraSpec, CameraModel), EdgeError> {
 /// A still camera before a dark surface, whose border is a straight line in the picture, and a bright sky.
 fn edge_sequence(camera: &CameraSpec, model: &CameraModel) -> Result<Sequence, EdgeError> {
     let side = camera.size_px[0];
-    let still = BodyState {
-        ..BodyState::default()
-    };
+    let still = BodyState { ..BodyState::default() };
     let trajectory = Trajectory::listed(vec![0.0], 1.0, vec![still]).ok_or(EdgeError::NoRays(side))?;
     let path = CameraPath::new(trajectory, &camera.mount)?;
     let pose = path.pose(0.0);

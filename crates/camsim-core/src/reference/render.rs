@@ -140,7 +140,7 @@ impl Oracle {
         let exposure = self.sequence.exposure(frame);
         let job = FrameJob {
             oracle: self,
-            photometry: Photometry::before_spread(&self.sequence.scenario.camera, exposure.as_ref()),
+            photometry: Photometry::before_point_spread(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
             picture: self.sequence.picture(frame) as u32,
             options,
@@ -325,7 +325,7 @@ impl FrameJob<'_> {
         let camera = &sequence.scenario.camera;
         let is_part = camera.face.is_some() || camera.primary.is_some();
         // Parts of a camera give light where the stage takes all of them at once.
-        if is_part && camera.is_finished_late() {
+        if is_part && camera.defers_photometric() {
             return color;
         }
         let spec = &camera.photometric;

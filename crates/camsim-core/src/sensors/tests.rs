@@ -37,11 +37,8 @@ fn input(trajectory: Trajectory, frame: Option<LocalFrame>, span_s: [f64; 2]) ->
 
 /// A platform that stands still in the given attitude.
 fn still(ned_from_body: DQuat) -> Trajectory {
-    let state = BodyState {
-        position_ned_m: DVec3::new(10.0, -20.0, -30.0),
-        ned_from_body,
-        ..BodyState::default()
-    };
+    let state =
+        BodyState { position_ned_m: DVec3::new(10.0, -20.0, -30.0), ned_from_body, ..BodyState::default() };
     Trajectory::listed(vec![0.0], 1.0, vec![state]).unwrap()
 }
 

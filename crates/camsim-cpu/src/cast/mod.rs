@@ -103,7 +103,7 @@ impl CastScene {
         let (depths, colors) = match (scale, thin) {
             (1, true) => (frame.sample_depths(size_px, |_| None), Vec::new()),
             (1, false) => {
-                let read = near_marks(size_px, inverse_depth);
+                let read = near_edges(size_px, inverse_depth);
                 let depth = |pixel: usize| (!read[pixel]).then_some([inverse_depth[pixel]; SAMPLES]);
                 (frame.sample_depths(size_px, depth), Vec::new())
             }
@@ -359,7 +359,7 @@ fn centre_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
 }
 
 /// Pixels near the edge pixels that the depths at pixel centres give.
-fn near_marks(size_px: [u32; 2], inverse_depth: &[f32]) -> Vec<bool> {
+fn near_edges(size_px: [u32; 2], inverse_depth: &[f32]) -> Vec<bool> {
     let [width, height] = size_px.map(|side| side as usize);
     let middle = |[x, y]: [i64; 2]| f64::from(inverse_depth[y as usize * width + x as usize]);
     let is_marked =

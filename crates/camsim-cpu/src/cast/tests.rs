@@ -306,7 +306,7 @@ fn marks_are_those_of_the_edge_and_all_depths_near_them_are_cast() {
     let image = cast.draw(&plan, &key);
     let frame = FrameCaster::new(&cast, &plan, &key, 1);
     let all = frame.sample_depths(SIZE_PX, |_| None);
-    let read = near_marks(SIZE_PX, &image.inverse_depth);
+    let read = near_edges(SIZE_PX, &image.inverse_depth);
     let known = |i: usize| (!read[i]).then_some([image.inverse_depth[i]; SAMPLES]);
     let some = frame.sample_depths(SIZE_PX, known);
     // A pixel is marked where the middle of one of the eight around it is on the other side of the edge than

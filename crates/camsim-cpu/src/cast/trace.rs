@@ -92,7 +92,10 @@ impl SceneTrees {
         let bounds: Vec<Aabb> = scene.mesh_bounds().into_iter().zip(&scene.meshes).map(still).collect();
         let mut tree = |mesh: &Mesh| {
             let shape = &mesh.shape;
-            known.entry(Arc::as_ptr(shape)).or_insert_with(|| Arc::new(RayBvh::new(&shape.triangle_boxes()))).clone()
+            known
+                .entry(Arc::as_ptr(shape))
+                .or_insert_with(|| Arc::new(RayBvh::new(&shape.triangle_boxes())))
+                .clone()
         };
         Self {
             meshes: RayBvh::new(&bounds),

@@ -45,7 +45,7 @@ use crate::{
 };
 
 /// Frames of a group whose probes are used together to estimate how many silhouettes there are.
-const TOGETHER: u64 = 8;
+const FRAMES_OF_A_GROUP: u64 = 8;
 
 /// A frame before anything is chosen for it.
 #[derive(Clone)]
@@ -63,7 +63,7 @@ pub(crate) struct FrameContext<'a> {
     /// The ideal frame that others are made from too, if this one is to be.
     pub shared: Option<&'a SharedIdeal>,
     /// Whether the frame has half of the probes: neighbours have the others.
-    has_half: bool,
+    has_fewer_probes: bool,
     /// Request for its sampling plan.
     pub request: SamplingRequest,
     /// Key instant.
@@ -114,17 +114,17 @@ impl<'a> FrameContext<'a> {
         inputs: &'a PlanInputs,
         frame: u64,
         shared: Option<&'a SharedIdeal>,
-        has_half: bool,
+        has_fewer_probes: bool,
     ) -> Result<Self, PlanError> {
         let stamp_s = inputs.stamp_s(frame);
         let zoom = inputs.zoom.as_ref().map(|_| zoom_at(&inputs.sequence.zoom_track, stamp_s));
-        let half = if has_half { inputs.half_the_probes(frame) } else { None };
+        let half = if has_fewer_probes { inputs.half_the_probes(frame) } else { None };
         let reach = match (&half.or_else(|| inputs.fixed.clone()), &inputs.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
             (None, Some(table), Some(value)) => Arc::new(inputs.zoomed(table, value)?),
             _ => return Err(PlanError::NoRay),
         };
-        let quarter = if has_half { inputs.quarter_of_the_probes(frame) } else { None };
+        let quarter = if has_fewer_probes { inputs.quarter_of_the_probes(frame) } else { None };
         let shutter = inputs.shutter_of(frame);
         let (first, last) = shutter.window_s();
         let window_s = [stamp_s + first, stamp_s + last];
@@ -145,7 +145,7 @@ impl<'a> FrameContext<'a> {
             dry_run_reach: quarter.unwrap_or_else(|| reach.clone()),
             reach,
             shared,
-            has_half,
+            has_fewer_probes,
             request: SamplingRequest::default(),
             key_s,
             key_pose,
@@ -283,7 +283,7 @@ impl<'a> FrameContext<'a> {
         let model = |all: &Neighbourhoods| {
             SilhouetteModel::new(all, &reach.camera, key_pose, &plane, disocclusion, least_share)
         };
-        if !self.has_half {
+        if !self.has_fewer_probes {
             return Some(model(&own));
         }
         Some(model(&own.with(self.neighbourhoods_of_others())))
@@ -301,7 +301,7 @@ impl<'a> FrameContext<'a> {
             stamp_s: self.inputs.stamp_s(frame),
             gain,
         };
-        let cache = if self.has_half { neighbourhoods_of_halves } else { neighbourhoods };
+        let cache = if self.has_fewer_probes { neighbourhoods_of_halves } else { neighbourhoods };
         cache.get(frame, || search.neighbourhoods())
     }
 
@@ -309,12 +309,12 @@ impl<'a> FrameContext<'a> {
     /// silhouettes are few, and half of the probes of one frame are too few.
     fn neighbourhoods_of_others(&self) -> impl Iterator<Item = Neighbourhoods> {
         let (inputs, frame) = (self.inputs, self.frame);
-        let first = frame / TOGETHER * TOGETHER;
+        let first = frame / FRAMES_OF_A_GROUP * FRAMES_OF_A_GROUP;
         // The frame beside it has the other half, whatever its group is.
         let is_beside = move |other: u64| {
             other == frame ^ 1 || other != frame && inputs.group_of(other) == inputs.group_of(frame)
         };
-        let others = (first..first + TOGETHER)
+        let others = (first..first + FRAMES_OF_A_GROUP)
             .filter(move |&other| other < inputs.sequence.frames && is_beside(other));
         let own_pose =
             |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.inputs.shutter.dt_pixel_s(x, y));

@@ -89,19 +89,19 @@ fn edge_passes(plan: &FramePlan) -> Vec<String> {
     let EdgeStage::Supersampled { scale, thin, .. } = plan.edges else { return Vec::new() };
     let [width, height] = plan.ideal.size_px;
     let frames = frames(plan);
-    let marks = format!("{width}x{height} px, marked where several surfaces are seen");
+    let mask = format!("{width}x{height} px, marked where several surfaces are seen");
     let color = if scale > 1 { "rgba16float + " } else { "" };
     let fine = format!("{frames}{}x{} px {color}depth32float, 4 samples each", width * scale, height * scale);
     let mut passes = if thin {
-        vec![format!("ideal_fine: {fine}"), format!("marks: {marks}, by their samples too")]
+        vec![format!("ideal_fine: {fine}"), format!("edge_mask: {mask}, by their samples too")]
     } else {
         vec![
-            format!("marks: {marks}"),
-            "near_marks: triangles near marks".to_owned(),
+            format!("edge_mask: {mask}"),
+            "triangles_near_edges: those near marked pixels".to_owned(),
             format!("ideal_fine: {fine}, of those triangles"),
         ]
     };
-    passes.push("stamp: marks into the alpha of the colour".to_owned());
+    passes.push("edge_mask_to_alpha: into the alpha of the colour".to_owned());
     passes.push("borders: lines within marked pixels; what lies within reach".to_owned());
     passes
 }

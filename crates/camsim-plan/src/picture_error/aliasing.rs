@@ -42,7 +42,7 @@ const WAVES: u32 = 288;
 const WAVES_OF_AREAS: u32 = 1152;
 /// Aliases from farther away than are counted (`transfer.rs`) are a tenth of what means over areas leave:
 /// without them 0.94 to 0.96 times what is measured is found of borders that do not move.
-const FARTHER_OF_AREAS: f64 = 1.1;
+const DISTANT_ALIASES_OF_AREAS: f64 = 1.1;
 /// From one wave to the next, as parts of the range: direction, and where the source lies between ideal
 /// pixels.
 const STEP_OF_WAVES: [f64; 3] = [0.618_033_988_749_895, 0.754_877_666_246_693, 0.569_840_290_998_053];
@@ -79,19 +79,20 @@ struct BorderGroup {
     /// Part of all that have borders, by squared contrast.
     part: f64,
     /// Side of the pixel and path over the exposure, pixels of the camera's focal length.
-    sides_px: [f64; 2],
+    footprint_px: [f64; 2],
 }
 
 impl BorderPixels {
     /// From squared contrasts of borders and the sides of pixels and paths there; pixels that are alike make
     /// one group.
     pub fn new(borders: impl Iterator<Item = (f64, [f64; 2])>) -> Self {
-        let alike = |sides_px: [f64; 2]| sides_px.map(|px| (STEPS_ALIKE * (1.0 + px).log2()).round() as i64);
+        let alike =
+            |footprint_px: [f64; 2]| footprint_px.map(|px| (STEPS_ALIKE * (1.0 + px).log2()).round() as i64);
         let mut groups: Vec<([i64; 2], BorderGroup)> = Vec::new();
-        for (part, sides_px) in borders {
-            match groups.iter_mut().find(|(key, _)| *key == alike(sides_px)) {
+        for (part, footprint_px) in borders {
+            match groups.iter_mut().find(|(key, _)| *key == alike(footprint_px)) {
                 Some((_, group)) => group.part += part,
-                None => groups.push((alike(sides_px), BorderGroup { part, sides_px })),
+                None => groups.push((alike(footprint_px), BorderGroup { part, footprint_px })),
             }
         }
         let all: f64 = groups.iter().map(|(_, group)| group.part).sum();
@@ -107,7 +108,7 @@ impl BorderPixels {
     /// pixel.
     pub fn aliasing2(&self, plan: &SamplingPlan, blur: Option<BlurStage>) -> f64 {
         let of_group = |group: &BorderGroup| {
-            let [width_px, path_px] = group.sides_px.map(|px| plan.scale * px);
+            let [width_px, path_px] = group.footprint_px.map(|px| plan.scale * px);
             let area = square(width_px, plan.taps);
             let exposure = blur.map(|blur| (path_px, sample_count(&blur, path_px, &area)));
             group.part
@@ -123,13 +124,13 @@ impl BorderPixels {
 
     /// Whether they move over an exposure.
     pub fn move_over_exposure(&self) -> bool {
-        self.0.iter().any(|group| group.sides_px[1] > 0.0)
+        self.0.iter().any(|group| group.footprint_px[1] > 0.0)
     }
 
     /// What so many rays of their own leave of borders that are known exactly, but for what `still` rays
     /// leave of borders that do not move.
     pub fn missed_by_rays(&self, rays: u32, still: u32) -> f64 {
-        let of_group = |&BorderGroup { part, sides_px: [width_px, path_px] }: &BorderGroup| {
+        let of_group = |&BorderGroup { part, footprint_px: [width_px, path_px] }: &BorderGroup| {
             let path = path_px / width_px;
             part * (missed_by_rays(rays, path) - (1.0 - path).max(0.0) * missed_by_rays(still, 0.0)).max(0.0)
         };
@@ -144,7 +145,7 @@ impl BorderPixels {
     /// the border.
     pub fn along_whole_pixels(&self, scale: f64) -> f64 {
         let of_group =
-            |group: &BorderGroup| group.part / (12.0 * scale * scale * (1.0 + group.sides_px[1]).sqrt());
+            |group: &BorderGroup| group.part / (12.0 * scale * scale * (1.0 + group.footprint_px[1]).sqrt());
         self.0.iter().map(of_group).sum()
     }
 }
@@ -268,7 +269,7 @@ fn sum_of_waves(width_px: f64, area: &Footprint, exposure: Option<(f64, u32)>) -
         )
     };
     let (table, farther) = match area.kernel {
-        Kernel::Area(_) => (&TABLE_OF_AREAS, FARTHER_OF_AREAS),
+        Kernel::Area(_) => (&TABLE_OF_AREAS, DISTANT_ALIASES_OF_AREAS),
         Kernel::Bilinear | Kernel::Spline(_) => (&TABLE, 1.0),
     };
     let squares: DVec2 = (0..).zip(table.iter()).map(of_direction).sum::<DVec2>() * farther;

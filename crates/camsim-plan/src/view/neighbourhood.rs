@@ -28,7 +28,7 @@ pub(crate) struct Neighbourhood {
     pub silhouette: Option<SilhouetteProbe>,
     /// Side of the pixel and length of the path over the exposure, pixels of the camera's focal length; where
     /// there is a border.
-    pub sides_px: Option<[f64; 2]>,
+    pub footprint_px: Option<[f64; 2]>,
     /// What lines through the probe cross, where models may be thinner than the distance of the nine points.
     pub crossings: LineCrossings,
     /// Squared contrast at silhouettes of the terrain, times their length in each pixel of the camera's focal
@@ -79,7 +79,7 @@ impl Neighbourhood {
     pub fn borders(&self) -> Option<(f64, [f64; 2])> {
         let LineCrossings { steps, touching, creases, .. } = self.crossings;
         let silhouette_steps = self.silhouette.as_ref().map_or(0.0, SilhouetteProbe::steps);
-        Some((silhouette_steps.max(steps) + touching + creases, self.sides_px?))
+        Some((silhouette_steps.max(steps) + touching + creases, self.footprint_px?))
     }
 }
 
@@ -169,12 +169,12 @@ impl NeighbourhoodSearch<'_> {
             / steps.len().max(1) as f64;
         let terrain_steps = terrain2 / f64::from(2 * NEAR_PX + 1) + crossings.on_terrain;
         let has_border = !steps.is_empty() || crossings.steps + crossings.touching + crossings.creases > 0.0;
-        let sides_px = (has_border || terrain_steps > 0.0).then(|| self.sides_px(&points));
+        let footprint_px = (has_border || terrain_steps > 0.0).then(|| self.footprint_px(&points));
         // The exposure spreads it over its path.
         let terrain_steps =
-            sides_px.map_or(0.0, |[side_px, path_px]| terrain_steps / (side_px * (side_px + path_px)));
-        let sides_px = sides_px.filter(|_| has_border);
-        let silhouette = sides_px
+            footprint_px.map_or(0.0, |[side_px, path_px]| terrain_steps / (side_px * (side_px + path_px)));
+        let footprint_px = footprint_px.filter(|_| has_border);
+        let silhouette = footprint_px
             .filter(|_| !steps.is_empty())
             .map(|[_, path_px]| silhouette_probe(&points, &steps, gain2, path_px));
         // Between points 3 px apart a crease bends threefold.
@@ -182,7 +182,7 @@ impl NeighbourhoodSearch<'_> {
         Neighbourhood {
             near_silhouette: silhouette.is_some() || crossings.count > 0 || LINES.iter().any(is_fold),
             silhouette,
-            sides_px,
+            footprint_px,
             crossings,
             terrain_steps,
             is_sky: points.is_sky(),
@@ -191,7 +191,7 @@ impl NeighbourhoodSearch<'_> {
 
     /// Side of a probe's pixel, and how far its path over the exposure goes: to and fro spreads a border no
     /// farther than that.
-    fn sides_px(&self, points: &NinePoints<'_>) -> [f64; 2] {
+    fn footprint_px(&self, points: &NinePoints<'_>) -> [f64; 2] {
         let (probe, focal_px) = (points.probe, self.reach.camera.central_focal_px());
         let exposure_s = self.shutter.exposure_pixel_s(probe.pixel[0], probe.pixel[1]);
         let path = path_px(self.path, points.mid_s, exposure_s, probe.uv, points.middle(), focal_px);

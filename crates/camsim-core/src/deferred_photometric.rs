@@ -1,5 +1,5 @@
 //! The photometric stage of a finished frame, for what passes that make one colour each, or have one weight for
-//! all colours, cannot do ([`crate::scenario::CameraSpec::is_finished_late`]).
+//! all colours, cannot do ([`crate::scenario::CameraSpec::defers_photometric`]).
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::{
 
 /// What is made of the light of whole frames.
 #[derive(Debug)]
-pub struct LatePhotometric {
+pub struct DeferredPhotometric {
     camera: CameraSpec,
     /// The scenario's seed, and that of the camera's noise.
     seeds: [u64; 2],
@@ -24,12 +24,12 @@ pub struct LatePhotometric {
     weights: [Vec<f32>; 3],
 }
 
-impl LatePhotometric {
+impl DeferredPhotometric {
     /// `None` where the passes do it, and for parts of a camera: it takes whole frames.
     #[must_use]
     pub fn new(sequence: &Sequence) -> Option<Self> {
         let camera = &sequence.scenario.camera;
-        if !camera.is_finished_late() || camera.face.is_some() || camera.primary.is_some() {
+        if !camera.defers_photometric() || camera.face.is_some() || camera.primary.is_some() {
             return None;
         }
         let weights = |primary| sequence.light_weights(primary).unwrap_or_default();
@@ -46,7 +46,7 @@ impl LatePhotometric {
         let width = frame.size_px[0] as usize;
         let [seed, noise_seed] = self.seeds;
         let picture = picture_of(&self.camera, seed, frame.index) as u32;
-        let stage = Photometry::before_spread(&self.camera, exposure);
+        let stage = Photometry::before_point_spread(&self.camera, exposure);
         frame.color_rgba.par_chunks_mut(4 * width).enumerate().for_each(|(y, row)| {
             for (x, rgba) in row.chunks_exact_mut(4).enumerate().filter(|(_, rgba)| rgba[3] > 0.0) {
                 let weight = |weights: &Vec<f32>| weights.get(y * width + x).copied().unwrap_or(1.0);
