@@ -16,7 +16,7 @@ use std::{
 };
 
 use camsim_core::{
-    frame::RenderedFrame,
+    frame::{Plane, RenderedFrame},
     mount::CameraPath,
     pose::BodyState,
     scenario::{Channel, FlightSpec, Scenario},
@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     refused.iter().for_each(|error| println!("    {error}"));
     // Whole rows.
     let blank = RenderedFrame {
-        color_rgba: vec![0.0; 4 * (SIZE_PX[0] * SIZE_PX[1]) as usize],
+        planes: vec![Plane::color(vec![0.0; 4 * (SIZE_PX[0] * SIZE_PX[1]) as usize])],
         ..frames.first().ok_or("no model can be shown")?.clone()
     };
     frames.resize(frames.len().next_multiple_of(COLUMNS as usize), blank);

@@ -14,9 +14,10 @@
 //!     let frame = &finished.frame;
 //!     let [width, height] = frame.size_px;
 //!     let middle = (height / 2 * width + width / 2) as usize;
-//!     let depth_m = frame.depth_m.as_ref().map(|depth_m| depth_m[middle]);
-//!     println!("{}: {:?} (linear R G B A), {depth_m:?} m", frame.index, &frame.color_rgba[4 * middle..][..4]);
-//!     # assert!(frame.color_rgba[4 * middle + 3] == 1.0 && depth_m > Some(1.0));
+//!     let color = &frame.color_rgba()[4 * middle..][..4];
+//!     let depth_m = frame.depth_m().map(|depth_m| depth_m[middle]);
+//!     println!("{}: {color:?} (linear R G B A), {depth_m:?} m", frame.index);
+//!     # assert!(color[3] == 1.0 && depth_m > Some(1.0));
 //!     Ok(())
 //! })?;
 //! # Ok(())

@@ -184,7 +184,7 @@ fn median_path_px(engine: &Engine, sequence: &Arc<Sequence>) -> Outcome<f64> {
         for part in 0..=PATH_PARTS {
             session.set_coords_phase(f32::from(part) / f32::from(PATH_PARTS) - 0.5);
             session.render::<Infallible>([frame], &mut |finished| {
-                let coords = finished.frame.coords.unwrap_or_default();
+                let coords = finished.frame.coords().unwrap_or_default().to_vec();
                 let scale = finished.plan.ideal.focal_px.x / sequence.scenario.camera.focal_px[0];
                 paths_px.resize(coords.len(), 0.0);
                 for ((path_px, new), old) in paths_px.iter_mut().zip(&coords).zip(previous.iter().flatten()) {

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _camsim
+from ._channels import Channels
 from ._errors import InputError
 
 
@@ -59,7 +60,7 @@ class Source:
     """Its attitude, scalar first; shape (4,)."""
 
 
-class Frame(Mapping[str, NDArray[Any]]):
+class Frame(Channels, Mapping[str, NDArray[Any]]):
     """A finished frame: numpy arrays of its channels, by name and as attributes.
 
     Each array is the memory that the renderer has filled, without a copy, and keeps it as long as the array is used:
@@ -140,89 +141,6 @@ class Frame(Mapping[str, NDArray[Any]]):
             return self._arrays[channel]
         held = ", ".join(self._arrays) or "none"
         raise AttributeError(f"the frame has no channel {channel!r}: ask for it by channels=[...]; it has {held}")
-
-    @property
-    def color(self) -> NDArray[np.float32]:
-        """Linear R, G, B and A; A is 1 where a ray exists, else 0. Float32, height x width x 4."""
-        return self._attribute("color")
-
-    @property
-    def depth(self) -> NDArray[np.float32]:
-        """Planar depth along the optical axis, metres; 0 where nothing is. Float32, height x width."""
-        return self._attribute("depth")
-
-    @property
-    def range(self) -> NDArray[np.float32]:
-        """Distance along the ray, metres; 0 where nothing is. Float32, height x width."""
-        return self._attribute("range")
-
-    @property
-    def valid(self) -> NDArray[np.uint8]:
-        """255 where a ray exists, else 0. Uint8, height x width."""
-        return self._attribute("valid")
-
-    @property
-    def coords(self) -> NDArray[np.float32]:
-        """Ideal ray u, v; source pixel x, y; time after the stamp, s; point or, for the sky, direction (north,
-        east, down). Float32, height x width x 8."""
-        return self._attribute("coords")
-
-    @property
-    def normal(self) -> NDArray[np.float32]:
-        """Unit normal towards the camera in optical axes (right, down, forwards). Float32, height x width x 3."""
-        return self._attribute("normal")
-
-    @property
-    def normal_world(self) -> NDArray[np.float32]:
-        """Unit normal towards the camera: north, east, down. Float32, height x width x 3."""
-        return self._attribute("normal_world")
-
-    @property
-    def object(self) -> NDArray[np.uint16]:
-        """Number of the object, as in `Scenario.objects`; 0 for the sky. Uint16, height x width."""
-        return self._attribute("object")
-
-    @property
-    def class_(self) -> NDArray[np.uint16]:
-        """Class of the object; 0 for none. Uint16, height x width. Also ``frame["class"]``."""
-        return self._attribute("class")
-
-    @property
-    def coverage(self) -> NDArray[np.float32]:
-        """Share of the pixel's area and exposure that the object at its centre has. Float32, height x width."""
-        return self._attribute("coverage")
-
-    @property
-    def flow(self) -> NDArray[np.float32]:
-        """Displacement dx, dy to frame i + k, pixels, and state (1: shown there). Float32, height x width x 3."""
-        return self._attribute("flow")
-
-    @property
-    def flow_back(self) -> NDArray[np.float32]:
-        """Displacement dx, dy to frame i - k, pixels, and state. Float32, height x width x 3."""
-        return self._attribute("flow_back")
-
-    @property
-    def flow_global(self) -> NDArray[np.float32]:
-        """Displacement dx, dy to the picture of a global shutter, pixels, and state. Float32, height x width x 3."""
-        return self._attribute("flow_global")
-
-    @property
-    def motion(self) -> NDArray[np.float32]:
-        """Velocity of the point's image at the pixel's instant, px/s: vx, vy. Float32, height x width x 2."""
-        return self._attribute("motion")
-
-    @property
-    def blur_path(self) -> NDArray[np.float32]:
-        """Displacement of the point's image at the begin (x0, y0) and at the end (x1, y1) of the exposure,
-        pixels. Float32, height x width x 4."""
-        return self._attribute("blur_path")
-
-    @property
-    def raw(self) -> NDArray[np.uint16]:
-        """Digital numbers of the image sensor, which `camera.sensor` describes. Uint16, height x width: the mosaic; or
-        height x width x 3 of a sensor without one."""
-        return self._attribute("raw")
 
     def save(self, path: str | os.PathLike[str], encoding: str | None = None) -> None:
         """Writes the picture: `.png` in an encoding of `camera.photometric.output` (the scenario's by default),

@@ -3,8 +3,7 @@
 use camsim::{
     core::{
         apply::{FlowField, IdealFrame, Motion, Pipeline, PoseRow, PoseTrack, Settings},
-        frame::RenderedFrame,
-        scenario::Preset,
+        scenario::{Channel, Preset},
         temporal::{IdealGeometry, displacement::Twist},
     },
     io::pictures::read_vignette,
@@ -18,7 +17,7 @@ use crate::{
     camera::Camera,
     engine::in_own_pool,
     error::{OrRaise, input_error},
-    frame::{frame_of, image},
+    frame::{frame_of, plane_array},
 };
 
 /// Depth from which on nothing is taken for a surface, as `depth_max_m` of `camsim apply`.
@@ -110,7 +109,8 @@ fn ideal_frame(
     depth: Option<&PyReadonlyArray2<'_, f32>>,
     about: &FrameArgument,
 ) -> PyResult<IdealFrame> {
-    let RenderedFrame { size_px, color_rgba, .. } = frame_of(color)?;
+    let frame = frame_of(color)?;
+    let (size_px, color_rgba) = (frame.size_px, frame.into_color());
     let [width, height] = size_px.map(f64::from);
     let inverse_depth: Vec<f32> = match depth {
         None => vec![0.0; color_rgba.len() / 4],
@@ -181,8 +181,9 @@ pub fn apply<'py>(
     })?;
     let size = [made.size_px[1] as usize, made.size_px[0] as usize];
     let parts = PyDict::new(py);
-    parts.set_item("color", image(py, made.color_rgba, size)?)?;
-    parts.set_item("depth", image(py, made.depth_m.unwrap_or_default(), size)?)?;
+    for plane in made.planes.into_iter().filter(|plane| plane.channel != Channel::Raw) {
+        parts.set_item(plane.channel.name(), plane_array(py, plane.values, size)?)?;
+    }
     parts.set_item("no_ray", empty.no_ray)?;
     parts.set_item("outside", empty.outside)?;
     parts.set_item("holes", empty.holes)?;

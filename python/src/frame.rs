@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use camsim::{
     core::{
-        frame::{COORDS_CHANNELS, PlaneValues, RenderedFrame},
-        scenario::{Channel, OutputEncoding},
+        frame::{PlaneValues, RenderedFrame},
+        scenario::{Channel, OutputEncoding, PlaneKind},
     },
     engine::Finished,
     io::{
@@ -64,36 +64,27 @@ fn source_dict<'py>(py: Python<'py>, source: &SourceFrame) -> PyResult<Bound<'py
 /// The channels that were asked for, of the types that files have. All but the small ones are what the
 /// renderer has allocated, which the arrays own.
 fn arrays<'py>(py: Python<'py>, frame: RenderedFrame, channels: &[Channel]) -> PyResult<Bound<'py, PyDict>> {
-    let [width, height] = frame.size_px.map(|side| side as usize);
+    let size = frame.size_px.map(|side| side as usize);
+    let size = [size[1], size[0]];
     let dict = PyDict::new(py);
-    let has = |channel| channels.contains(&channel);
-    if has(Channel::Valid) {
-        let valid = frame.color_rgba.chunks_exact(4).map(|rgba| if rgba[3] > 0.0 { u8::MAX } else { 0 });
-        dict.set_item("valid", image(py, valid.collect(), [height, width])?)?;
+    for mask in channels.iter().filter(|channel| channel.kind() == PlaneKind::Mask) {
+        let valid = frame.color_rgba().chunks_exact(4).map(|rgba| if rgba[3] > 0.0 { u8::MAX } else { 0 });
+        dict.set_item(mask.name(), image(py, valid.collect(), size)?)?;
     }
-    if has(Channel::Color) {
-        dict.set_item("color", image(py, frame.color_rgba, [height, width])?)?;
-    }
-    if let Some(depth_m) = frame.depth_m.filter(|_| has(Channel::Depth)) {
-        dict.set_item("depth", image(py, depth_m, [height, width])?)?;
-    }
-    if let Some(coords) = frame.coords.filter(|_| has(Channel::Coords)) {
-        dict.set_item("coords", table_image::<_, COORDS_CHANNELS>(py, coords, [height, width])?)?;
-    }
-    if let Some(raw) = frame.raw.filter(|_| has(Channel::Raw)) {
-        dict.set_item("raw", image(py, raw.values, [height, width])?)?;
-    }
-    for plane in frame.planes.into_iter().filter(|plane| has(plane.channel)) {
-        let array = match plane.values {
-            PlaneValues::Float(values) => image(py, values, [height, width])?,
-            // `object` and `class` of 65535 objects at most, as their files.
-            PlaneValues::Index(numbers) => {
-                image(py, numbers.iter().map(|&number| number as u16).collect(), [height, width])?
-            }
-        };
-        dict.set_item(plane.channel.name(), array)?;
+    for plane in frame.planes.into_iter().filter(|plane| channels.contains(&plane.channel)) {
+        dict.set_item(plane.channel.name(), plane_array(py, plane.values, size)?)?;
     }
     Ok(dict)
+}
+
+/// The array of a plane.
+pub fn plane_array(py: Python<'_>, values: PlaneValues, size: [usize; 2]) -> PyResult<Bound<'_, PyAny>> {
+    match values {
+        PlaneValues::Float(values) => image(py, values, size),
+        // `object` and `class` of 65535 objects at most, as their files.
+        PlaneValues::Index(numbers) => image(py, numbers.iter().map(|&number| number as u16).collect(), size),
+        PlaneValues::Raw(raw) => image(py, raw.values, size),
+    }
 }
 
 /// An array of height x width, and x components where a pixel has several.
@@ -110,14 +101,6 @@ pub fn image<'py, T: Element>(
     })
 }
 
-fn table_image<'py, T: Element, const N: usize>(
-    py: Python<'py>,
-    values: Vec<[T; N]>,
-    size: [usize; 2],
-) -> PyResult<Bound<'py, PyAny>> {
-    image(py, values.into_flattened(), size)
-}
-
 /// A frame of a colour picture alone.
 pub fn frame_of(color: &PyReadonlyArray3<'_, f32>) -> PyResult<RenderedFrame> {
     let [height, width, components] = [color.shape()[0], color.shape()[1], color.shape()[2]];
@@ -127,7 +110,7 @@ pub fn frame_of(color: &PyReadonlyArray3<'_, f32>) -> PyResult<RenderedFrame> {
         _ => return Err(input_error(format!("a picture has 3 or 4 components a pixel, not {components}"))),
     };
     let side = |pixels: usize| u32::try_from(pixels).map_err(|_| crate::error::too_large("the picture"));
-    Ok(RenderedFrame { size_px: [side(width)?, side(height)?], color_rgba, ..RenderedFrame::default() })
+    Ok(RenderedFrame::picture([side(width)?, side(height)?], color_rgba))
 }
 
 /// Writes a linear colour picture, height x width x 3 or 4, as `.png` (encoded) or `.exr`.

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::{
     camera::CameraModel,
-    frame::RenderedFrame,
+    frame::{Plane, RenderedFrame},
     imaging::{ImageSensor, Optics},
     noise::{camera_seed, tail_table},
     photometric::{GrayImage, Photometry, photometric},
@@ -306,8 +306,7 @@ impl<'a> Pipeline<'a> {
         let mut frame = RenderedFrame {
             index: self.settings.frame,
             size_px,
-            color_rgba,
-            depth_m: Some(depth_m),
+            planes: vec![Plane::color(color_rgba), Plane::depth(depth_m)],
             ..RenderedFrame::default()
         };
         if let Some(optics) = Optics::new(self.spec, self.settings.seed) {

@@ -47,7 +47,7 @@ impl DeferredPhotometric {
         let [seed, noise_seed] = self.seeds;
         let picture = picture_of(&self.camera, seed, frame.index) as u32;
         let stage = Photometry::before_point_spread(&self.camera, exposure);
-        frame.color_rgba.par_chunks_mut(4 * width).enumerate().for_each(|(y, row)| {
+        frame.color_rgba_mut().par_chunks_mut(4 * width).enumerate().for_each(|(y, row)| {
             for (x, rgba) in row.chunks_exact_mut(4).enumerate().filter(|(_, rgba)| rgba[3] > 0.0) {
                 let weight = |weights: &Vec<f32>| weights.get(y * width + x).copied().unwrap_or(1.0);
                 let weights = self.weights.each_ref().map(weight);

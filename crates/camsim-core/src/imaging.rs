@@ -22,9 +22,9 @@ use rayon::prelude::*;
 
 use crate::{
     exposure::FrameExposure,
-    frame::{RawPicture, RenderedFrame},
+    frame::{PlaneValues, RawPicture, RenderedFrame},
     noise::camera_seed,
-    scenario::{CameraSpec, ImageSensorSpec, Mosaic, Reset, ShutterSpec},
+    scenario::{CameraSpec, Channel, ImageSensorSpec, Mosaic, Reset, ShutterSpec},
     shutter::{RowAxis, Shutter},
     timing_faults::picture_of,
 };
@@ -139,9 +139,9 @@ impl ImageSensor {
         let exposed = own.as_ref().unwrap_or(&self.nominal);
         let faulty = self.key.timing.as_ref();
         let picture = faulty.map_or(frame.index, |camera| picture_of(camera, self.key.seed, frame.index));
-        let raw = self.raw_of(exposed, picture as u32, stamp_s, &frame.color_rgba);
-        exposed.develop.develop(&raw, self.key.size_px, &mut frame.color_rgba);
-        frame.raw = Some(raw);
+        let raw = self.raw_of(exposed, picture as u32, stamp_s, frame.color_rgba());
+        exposed.develop.develop(&raw, self.key.size_px, frame.color_rgba_mut());
+        frame.set(Channel::Raw, PlaneValues::Raw(raw));
     }
 
     /// Digital numbers of the light of a frame, linear R G B A, row-major, with the scenario's exposure.

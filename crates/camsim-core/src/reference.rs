@@ -43,7 +43,8 @@ mod truth;
 
 pub use disocclusion::{Disocclusion, disocclusion};
 pub use flow_errors::{
-    CoverageErrors, FLOW_TOLERANCE_PX, FlowErrors, FlowStats, coverage_errors, flow_errors, is_flow,
+    COVERAGE_TOLERANCE, CoverageErrors, FLOW_TOLERANCE_PX, FlowErrors, FlowStats, MOTION_TOLERANCE,
+    coverage_errors, flow_errors,
 };
 use lens_inverse::LensInverse;
 pub use measure::{
@@ -52,7 +53,7 @@ pub use measure::{
 };
 use mesh_bvh::MeshBvh;
 use moving::{MovingMeshes, moving_meshes};
-pub use plane_errors::{NORMAL_TOLERANCE_RAD, PlaneErrors, is_compared, plane_errors};
+pub use plane_errors::{NORMAL_TOLERANCE_RAD, PlaneErrors, plane_errors};
 use ray::Ray;
 pub use render::{Convergence, IdealView, RenderOptions};
 use shading::Shading;

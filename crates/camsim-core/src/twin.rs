@@ -79,7 +79,7 @@ pub fn scenario_of(
     }
     scenario.output.tracks = None;
     scenario.output.palette &=
-        scenario.output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
+        scenario.output.channels.iter().any(|channel| channel.kind() == PlaneKind::Index);
     Ok(scenario)
 }
 

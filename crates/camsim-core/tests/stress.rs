@@ -112,7 +112,7 @@ fn path_longer_than_the_image() {
         let u = (f64::from(x) - 29.5) / 50.0;
         // Mean of the wave over 3 units of u.
         let expected = 0.5 + 0.4 * (9.0 * u).sin() * 13.5_f64.sin() / 13.5;
-        let value = f64::from(rendered.color_rgba[4 * (10 * 60 + x) as usize]);
+        let value = f64::from(rendered.color_rgba()[4 * (10 * 60 + x) as usize]);
         // A bilinear read of a wave with a period of 35 px loses (2 pi / 35)^2 / 12 of its amplitude: 3e-3 of
         // 0.03.
         assert!((value - expected).abs() < 3e-4, "{x}: {value} {expected}");
@@ -120,7 +120,7 @@ fn path_longer_than_the_image() {
     // ... and without a source, and without a panic, in an ideal frame of the same size.
     let narrow = level([60, 20], 50.0, wave);
     let rendered = Pipeline::new(&spec, &narrow, &motion, &Settings::default()).unwrap().render(None);
-    assert!(rendered.color_rgba.iter().all(|v| *v == 0.0));
+    assert!(rendered.color_rgba().iter().all(|v| *v == 0.0));
 }
 
 /// Boxes on level ground 100 m below a camera that looks straight down, in camera axes (x right, y down, z

@@ -55,7 +55,7 @@ pub(crate) fn turn_to_camera_axes(frame: &mut RenderedFrame, plan: &FramePlan) {
     let whole_from_face = face.camera_from_face();
     let width = frame.size_px[0] as usize;
     let camera: &CameraModel = &plan.camera;
-    if let Some(depth_m) = &mut frame.depth_m {
+    if let Some(depth_m) = frame.floats_mut(Channel::Depth) {
         depth_m.par_iter_mut().enumerate().filter(|(_, depth_m)| **depth_m != 0.0).for_each(
             |(i, depth_m)| {
                 let pixel = DVec2::new((i % width) as f64, (i / width) as f64);
@@ -64,14 +64,9 @@ pub(crate) fn turn_to_camera_axes(frame: &mut RenderedFrame, plan: &FramePlan) {
             },
         );
     }
-    for Plane { channel, values } in &mut frame.planes {
-        if let (Channel::Normal, PlaneValues::Float(normals)) = (channel, values) {
-            for normal in normals.chunks_exact_mut(3) {
-                let turned =
-                    whole_from_face * DVec3::new(normal[0].into(), normal[1].into(), normal[2].into());
-                normal.copy_from_slice(&turned.as_vec3().to_array());
-            }
-        }
+    for normal in frame.floats_mut(Channel::Normal).unwrap_or_default().chunks_exact_mut(3) {
+        let turned = whole_from_face * DVec3::new(normal[0].into(), normal[1].into(), normal[2].into());
+        normal.copy_from_slice(&turned.as_vec3().to_array());
     }
 }
 
@@ -93,7 +88,7 @@ pub(crate) fn add_part(whole: &mut Option<Finished>, mut part: Finished) {
         Some(whole) => add(whole, part),
         None => {
             if let Some(primary) = part.plan.primary {
-                part.frame.color_rgba.par_chunks_exact_mut(4).for_each(|rgba| keep(rgba, primary));
+                part.frame.color_rgba_mut().par_chunks_exact_mut(4).for_each(|rgba| keep(rgba, primary));
             }
             *whole = Some(part);
         }
@@ -103,7 +98,7 @@ pub(crate) fn add_part(whole: &mut Option<Finished>, mut part: Finished) {
 /// The frame of all parts: pixels are black where the lens of truth has no ray.
 pub(crate) fn joined(mut whole: Finished) -> Finished {
     if whole.plan.primary.is_some() {
-        let invalid = whole.frame.color_rgba.par_chunks_exact_mut(4).filter(|rgba| rgba[3] == 0.0);
+        let invalid = whole.frame.color_rgba_mut().par_chunks_exact_mut(4).filter(|rgba| rgba[3] == 0.0);
         invalid.for_each(|rgba| rgba.fill(0.0));
     }
     whole
@@ -116,21 +111,20 @@ fn keep(rgba: &mut [f32], primary: Primary) {
 
 fn add(whole: &mut Finished, part: Finished) {
     let Finished { frame, plan, lod: _, out_of_order, times, faces } = part;
-    let held: Vec<bool> = frame.color_rgba.par_chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
+    let held: Vec<bool> = frame.color_rgba().par_chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
     let into = &mut whole.frame;
-    match plan.primary {
-        None => copy(&mut into.color_rgba, &frame.color_rgba, &held),
-        Some(primary) => copy_color(&mut into.color_rgba, &frame.color_rgba, primary),
+    if let Some(primary) = plan.primary {
+        copy_color(into.color_rgba_mut(), frame.color_rgba(), primary);
     }
     whole.times.add(&times);
     if matches!(plan.primary, Some(Primary::Red | Primary::Blue)) {
         return;
     }
-    if let (Some(into), Some(from)) = (&mut into.depth_m, &frame.depth_m) {
-        copy(into, from, &held);
-    }
-    for (into, from) in into.planes.iter_mut().zip(&frame.planes) {
-        match (&mut into.values, &from.values) {
+    for Plane { channel, values } in &frame.planes {
+        // Coordinates are in each part's own frame.
+        let is_done = *channel == Channel::Coords || (*channel == Channel::Color && plan.primary.is_some());
+        let Some(into) = into.values_mut(*channel).filter(|_| !is_done) else { continue };
+        match (into, values) {
             (PlaneValues::Float(into), PlaneValues::Float(from)) => copy(into, from, &held),
             (PlaneValues::Index(into), PlaneValues::Index(from)) => copy(into, from, &held),
             _ => {}

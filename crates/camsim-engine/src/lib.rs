@@ -12,7 +12,7 @@
 //!     let mut session = engine.session(sequence, &[Channel::Color])?;
 //!     session.render(0..10, &mut |finished| {
 //!         let frame = finished.frame;
-//!         println!("{}: {}", frame.index, frame.color_rgba.iter().sum::<f32>());
+//!         println!("{}: {}", frame.index, frame.color_rgba().iter().sum::<f32>());
 //!         Ok(())
 //!     })
 //! }

@@ -401,21 +401,20 @@ impl<'a> Session<'a> {
         if let Some(lamps) = &self.lanes[lane].lamps {
             lamps.paint(&mut color_rgba, plan);
         }
-        let planes = match &mut truth {
-            Some(truth) => self.complete_truth(lane, plan, &color_rgba, truth)?,
-            None => Vec::new(),
-        };
-        let coords = truth.as_ref().map(|truth| finished::coords(truth, &color_rgba, plan, &sequence.path));
+        let mut planes = Vec::new();
+        if let Some(truth) = &mut truth {
+            let by_rays = self.complete_truth(lane, plan, &color_rgba, truth)?;
+            planes.push(Plane::depth(truth.iter().map(|t| t.depth_m).collect()));
+            planes.push(Plane::coords(finished::coords(truth, &color_rgba, plan, &sequence.path)));
+            planes.extend(by_rays);
+        }
+        planes.insert(0, Plane::color(color_rgba));
         let mut frame = RenderedFrame {
             index: plan.frame,
             stamp_ns: sequence.stamp_ns(plan.frame),
             size_px: plan.camera.size_px,
-            color_rgba,
-            depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
-            coords,
             rows: if is_other { Vec::new() } else { self.planner.rows(plan) },
             planes,
-            raw: None,
         };
         if self.lanes.len() > 1 {
             turn_to_camera_axes(&mut frame, plan);

@@ -75,8 +75,8 @@ fn finished(sequence: &Arc<Sequence>, frames: impl IntoIterator<Item = u64>) -> 
 }
 
 fn rms(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
-    let squares = a.color_rgba.iter().zip(&b.color_rgba).map(|(a, b)| f64::from(a - b).powi(2));
-    (squares.sum::<f64>() / a.color_rgba.len() as f64).sqrt()
+    let squares = a.color_rgba().iter().zip(b.color_rgba()).map(|(a, b)| f64::from(a - b).powi(2));
+    (squares.sum::<f64>() / a.color_rgba().len() as f64).sqrt()
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn every_renderer_exposes_a_frame_as_the_reference_does() {
             // `quality.max_error_dn`, and the oracle's own noise.
             let error = rms(&found.frame, &exact) * 255.0;
             assert!(error < 1.0, "{frame} {place:?}: {error}");
-            let mean: f64 = found.frame.color_rgba.chunks_exact(4).map(|p| f64::from(p[1])).sum();
+            let mean: f64 = found.frame.color_rgba().chunks_exact(4).map(|p| f64::from(p[1])).sum();
             let mean = mean / (96.0 * 72.0);
             assert!((mean / 0.25 - 1.0).abs() < 0.1, "{frame}: {mean}");
         }
@@ -118,7 +118,7 @@ fn a_frame_by_itself_is_the_frame_of_a_run() {
         for k in [0, 13, 23] {
             let alone = finished(&flight(sensor.clone()), [20 + k as u64]);
             let (alone, run) = (&alone[0].frame, &run[k].frame);
-            assert!(alone.color_rgba == run.color_rgba && alone.raw == run.raw, "{k}");
+            assert!(alone.color_rgba() == run.color_rgba() && alone.raw() == run.raw(), "{k}");
         }
     }
 }
@@ -127,7 +127,7 @@ fn a_frame_by_itself_is_the_frame_of_a_run() {
 fn gain_and_time_make_the_numbers_of_the_sensor() {
     let sequence = flight(Some(sensor()));
     for one in finished(&sequence, [0, 95]) {
-        let raw = one.frame.raw.expect("a raw picture");
+        let raw = one.frame.raw().expect("a raw picture");
         let mean = raw.values.iter().map(|&dn| f64::from(dn) / 4095.0).sum::<f64>() / raw.values.len() as f64;
         assert!((mean / 0.25 - 1.0).abs() < 0.1, "{mean}");
     }

@@ -65,9 +65,9 @@ fn ground_beyond_the_texture_has_one_colour() {
                 sequence(scenario, steady(height_m, 20.0, DVec3::ZERO, DVec3::ZERO), scene.clone());
             let frame =
                 render(&engine, &sequence, &[Channel::Color, Channel::Coords, Channel::Depth], 0).frame;
-            let (coords, depth) = (frame.coords.expect("coords"), frame.depth_m.expect("depth"));
+            let (coords, depth) = (frame.coords().expect("coords"), frame.depth_m().expect("depth"));
             let (mut beyond, mut inside, mut worst) = (0, 0, 0.0_f32);
-            for (i, color) in frame.color_rgba.chunks_exact(4).enumerate() {
+            for (i, color) in frame.color_rgba().chunks_exact(4).enumerate() {
                 let at = [5, 6].map(|k| f64::from(coords[i][k]).abs());
                 if depth[i] <= 0.0 {
                     continue;

@@ -52,9 +52,9 @@ fn error_dn(finished: &Finished, sequence: &Arc<Sequence>) -> f64 {
     let oracle = Oracle::new(sequence.clone()).expect("an oracle");
     let options = RenderOptions { min_samples: 16, max_samples: 64, ..RenderOptions::default() };
     let exact = oracle.render(FRAME, &options);
-    let pairs = finished.frame.color_rgba.iter().zip(&exact.color_rgba);
+    let pairs = finished.frame.color_rgba().iter().zip(exact.color_rgba());
     let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
-    255.0 * (squares / exact.color_rgba.len() as f64).sqrt()
+    255.0 * (squares / exact.color_rgba().len() as f64).sqrt()
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
 
 /// PSNR of each colour over the pixels that are valid in both, dB, and the number of those valid in one alone.
 fn psnr_db(a: &RenderedFrame, b: &RenderedFrame) -> ([f64; 3], usize) {
-    let pixels = || a.color_rgba.chunks_exact(4).zip(b.color_rgba.chunks_exact(4));
+    let pixels = || a.color_rgba().chunks_exact(4).zip(b.color_rgba().chunks_exact(4));
     let both = || pixels().filter(|(a, b)| a[3] > 0.0 && b[3] > 0.0);
     let count = both().count() as f64;
     let psnr = |k: usize| {
@@ -91,7 +91,9 @@ fn chromatic_pictures_are_those_of_the_reference() {
     let (apart, _) = psnr_db(&done.frame, &oracle(&plain));
     assert!(apart[0] < 35.0 && apart[2] < 35.0 && apart[1] > 47.0, "{apart:?}");
     // Truth is that of green's rays.
-    let depth = |sequence| render(&engine, sequence, &channels, FRAME).frame.depth_m.expect("depth");
+    let depth = |sequence| {
+        render(&engine, sequence, &channels, FRAME).frame.into_floats(Channel::Depth).expect("depth")
+    };
     let off = depth(&plain).iter().zip(depth(&chromatic)).filter(|(a, b)| (*a - b).abs() > 1e-4 * *a).count();
     assert!(off < 20, "{off} depths differ");
 }
@@ -181,7 +183,7 @@ fn fringes_are_as_wide_as_the_lenses_say() {
         Primary::ALL.map(|primary| CameraModel::from_spec(&spec.of_primary(primary)).expect("a camera"));
     let frame = render(&Engine::cpu(), &sequence, &[Channel::Color], 0).frame;
     let value = |x: usize, y: usize, k: usize| {
-        (f64::from(frame.color_rgba[4 * (320 * y + x) + k]) - DARK) / (BRIGHT - DARK)
+        (f64::from(frame.color_rgba()[4 * (320 * y + x) + k]) - DARK) / (BRIGHT - DARK)
     };
     let (mut worst, mut widest, mut edges) = (0.0_f64, 0.0_f64, 0);
     for y in (4..236).step_by(8) {
@@ -245,7 +247,7 @@ fn colors_of_a_wide_field_have_borders_of_faces_of_their_own() {
         let part = Arc::new(sequence.face(face).primary(primary));
         let exact = Oracle::new(part).expect("an oracle").render(FRAME, &options);
         let k = primary.channel();
-        for (got, wanted) in frame.color_rgba.chunks_exact(4).zip(exact.color_rgba.chunks_exact(4)) {
+        for (got, wanted) in frame.color_rgba().chunks_exact(4).zip(exact.color_rgba().chunks_exact(4)) {
             if wanted[3] > 0.0 && got[3] > 0.0 {
                 squares[k] += f64::from(got[k] - wanted[k]).powi(2);
                 counts[k] += 1;
@@ -254,7 +256,7 @@ fn colors_of_a_wide_field_have_borders_of_faces_of_their_own() {
     }
     let psnr = [0, 1, 2].map(|k| -10.0 * (squares[k] / f64::from(counts[k])).log10());
     println!("{psnr:.1?} dB over {counts:?} pixels");
-    let valid = frame.color_rgba.chunks_exact(4).filter(|rgba| rgba[3] > 0.0).count() as f64;
+    let valid = frame.color_rgba().chunks_exact(4).filter(|rgba| rgba[3] > 0.0).count() as f64;
     assert!(
         (valid / (std::f64::consts::PI * 99.0 * 99.0) - 1.0).abs() < 0.002,
         "{valid} pixels in the circle"
@@ -292,7 +294,7 @@ fn luminance_and_colored_gains_are_those_of_all_colors() {
     let mut squares = [0.0; 2];
     for (i, pixel) in (0..160 * 120).map(|i| (i as usize, [i % 160, i / 160])) {
         let [plain, grey, colored] =
-            [&plain, &grey, &colored].map(|frame| &frame.color_rgba[4 * i..4 * i + 4]);
+            [&plain, &grey, &colored].map(|frame| &frame.color_rgba()[4 * i..4 * i + 4]);
         let rgb = [plain[0], plain[1], plain[2]];
         let stage = Photometry::whole(&grey_of.scenario.camera, None);
         let expected = photometric(&stage, rgb, 1.0, pixel, number, seed, &table);
@@ -335,7 +337,7 @@ fn light_falls_as_the_model_says_in_all_renderers() {
     let [plain, falling_frame] =
         [&plain, &falling].map(|sequence| render(&engine, sequence, &[Channel::Color], FRAME).frame);
     for (i, (plain, got)) in
-        plain.color_rgba.chunks_exact(4).zip(falling_frame.color_rgba.chunks_exact(4)).enumerate()
+        plain.color_rgba().chunks_exact(4).zip(falling_frame.color_rgba().chunks_exact(4)).enumerate()
     {
         let (x, y) = ((i % 96) as f64 - 47.5, (i / 96) as f64 - 35.5);
         // Half of the diagonal is as long as the focal length.

@@ -103,7 +103,7 @@ fn a_failed_gpu_pass_changes_no_other_frame() {
         "silhouette rays are the gpu's"
     );
     let same = |finished: &[Finished]| {
-        finished.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba == b.frame.color_rgba)
+        finished.iter().zip(&expected).all(|(a, b)| a.frame.color_rgba() == b.frame.color_rgba())
     };
 
     let rays = folder.join("reverse/edges/silhouette_rays.wgsl");

@@ -36,7 +36,7 @@ fn srgb_bytes_are_decoded_by_the_standard() {
     let scene = Scene { meshes: vec![chart()], ..Scene::default() };
     let sequence = sequence(scenario, steady(100.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
     let engine = engine();
-    let picture = render(&engine, &sequence, &[Channel::Color], 0).frame.color_rgba;
+    let picture = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
     // Seen from 100 m the square is 150 pixels wide, a texel 9.4. North is up.
     let mut worst = (0.0, 0);
     for byte in 0..256_usize {

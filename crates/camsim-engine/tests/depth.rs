@@ -82,12 +82,12 @@ fn depths_between_two_surfaces_are_detected() {
     let sequence =
         sequence(camera(-90.0), steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
     let mut done = render(&engine(), &sequence, &[Channel::Depth], 0);
-    let depths = done.frame.depth_m.clone().expect("depth");
+    let depths = done.frame.depth_m().expect("depth").to_vec();
     let step = |i: usize| (depths[i] - depths[i + 1]).abs() > 0.2 * depths[i];
     let beside: Vec<usize> = (0..depths.len() - 1).filter(|i| i % 200 != 199 && step(*i)).collect();
     assert!(beside.len() > 20 && errors(&sequence, &done).is_consistent());
     for &i in &beside {
-        let depth_m = done.frame.depth_m.as_mut().expect("depth");
+        let depth_m = done.frame.floats_mut(Channel::Depth).expect("depth");
         depth_m[i] = 0.5 * (depths[i] + depths[i + 1]);
     }
     let found = errors(&sequence, &done);
@@ -99,7 +99,7 @@ fn depths_between_two_surfaces_are_detected() {
     assert!(!found.is_consistent() && found.depth_max > 0.05, "{found:?}");
     // A surface that is there, but not within reach of the pixel, is as wrong.
     let mut far = render(&engine(), &sequence, &[Channel::Depth], 0);
-    far.frame.depth_m.as_mut().expect("depth")[beside[0] - 5] = depths[beside[0] + 1];
+    far.frame.floats_mut(Channel::Depth).expect("depth")[beside[0] - 5] = depths[beside[0] + 1];
     assert_eq!(errors(&sequence, &far).depth_faults, 1);
 }
 

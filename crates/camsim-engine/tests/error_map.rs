@@ -189,7 +189,7 @@ fn pixel_errors_are_within_the_neighbouring_predictions() {
         let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
         let view = oracle.view(0);
         let key = done.plan.ideal_view();
-        let coords = done.frame.coords.as_ref().expect("asked for");
+        let coords = done.frame.coords().expect("asked for");
         let (mut within, mut all, mut apart, mut least_px, mut most_px) = (0, 0, 0, f64::INFINITY, 0.0_f64);
         for i in 0..PIXELS {
             let [x, y, ..] = pcg4d([i, 3, 1, 4]);

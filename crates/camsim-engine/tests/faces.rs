@@ -58,8 +58,8 @@ fn oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
         .map(|face| Oracle::new(Arc::new(sequence.face(face))).expect("an oracle").render(FRAME, &options));
     let [mut whole, others @ ..] = frames;
     for (i, _) in pixels() {
-        if let Some(other) = others.iter().find(|other| other.color_rgba[4 * i + 3] > 0.0) {
-            whole.color_rgba[4 * i..4 * i + 4].copy_from_slice(&other.color_rgba[4 * i..4 * i + 4]);
+        if let Some(other) = others.iter().find(|other| other.color_rgba()[4 * i + 3] > 0.0) {
+            whole.color_rgba_mut()[4 * i..4 * i + 4].copy_from_slice(&other.color_rgba()[4 * i..4 * i + 4]);
         }
     }
     whole
@@ -76,7 +76,7 @@ fn a_wide_frame_has_every_pixel_and_no_seam() {
     // Squares of errors, 1/255: at the faces' borders, and elsewhere.
     let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
     for (i, pixel) in pixels() {
-        let [got, wanted] = [&done.frame, &expected].map(|frame| &frame.color_rgba[4 * i..4 * i + 4]);
+        let [got, wanted] = [&done.frame, &expected].map(|frame| &frame.color_rgba()[4 * i..4 * i + 4]);
         assert_eq!(got[3] > 0.0, face(pixel).is_some(), "{pixel}");
         assert_eq!(got[3], wanted[3], "{pixel}");
         if got[3] == 0.0 {
@@ -104,7 +104,7 @@ fn truth_of_a_wide_frame_is_in_the_axes_of_the_whole_camera() {
     let channels = [Channel::Depth, Channel::Range, Channel::Normal, Channel::Flow];
     let frame = render(&Engine::cpu(), &sequence, &channels, FRAME).frame;
     let oracle = Oracle::new(sequence.clone()).expect("an oracle");
-    let depth_m = frame.depth_m.as_ref().expect("depth");
+    let depth_m = frame.depth_m().expect("depth");
     let values = |channel| frame.floats(channel).expect("a plane");
     let at = |number: u64, pixel: DVec2| {
         let t_s =

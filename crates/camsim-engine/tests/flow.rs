@@ -223,7 +223,7 @@ fn a_frame_is_the_other_one_warped_by_flow() {
     let width = SIZE_PX[0] as usize;
     // A straight line through two pixels is off by an eighth of the second difference in their middle.
     let bend = |i: usize, k: usize| {
-        let at = |i: usize| f64::from(other.color_rgba[4 * i + k]);
+        let at = |i: usize| f64::from(other.color_rgba()[4 * i + k]);
         [1, width].map(|step| (at(i - step) - 2.0 * at(i) + at(i + step)) / 8.0).iter().sum::<f64>()
     };
     let mut squares = [0.0_f64; 3];
@@ -234,7 +234,7 @@ fn a_frame_is_the_other_one_warped_by_flow() {
         if here.is_none() {
             continue;
         }
-        let warped = read::<4>(&other.color_rgba, place(i) + shift_px, |i| object(&other, i) == here);
+        let warped = read::<4>(other.color_rgba(), place(i) + shift_px, |i| object(&other, i) == here);
         let Some(warped) = warped else { continue };
         let seen = (place(i) + shift_px).round().as_u64vec2();
         let nearest = seen.y as usize * width + seen.x as usize;
@@ -243,9 +243,9 @@ fn a_frame_is_the_other_one_warped_by_flow() {
         }
         for (k, value) in warped.iter().enumerate().take(3) {
             squares[2] += bend(nearest, k).powi(2);
-            let here = f64::from(first.color_rgba[4 * i + k]);
+            let here = f64::from(first.color_rgba()[4 * i + k]);
             squares[0] += (value - here).powi(2);
-            squares[1] += (f64::from(other.color_rgba[4 * i + k]) - here).powi(2);
+            squares[1] += (f64::from(other.color_rgba()[4 * i + k]) - here).powi(2);
         }
         count += 3.0;
     }

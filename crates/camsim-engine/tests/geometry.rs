@@ -55,7 +55,7 @@ fn errors(scenario: Scenario, trajectory: Trajectory) -> (f64, f64, u32) {
     let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0_u32);
     for phase in [-0.5, -0.3, 0.0, 0.17, 0.5] {
         let done = render_at_phase(&engine, &sequence, &[Channel::Coords], 0, phase);
-        let coords = done.frame.coords.as_ref().expect("coords were asked for");
+        let coords = done.frame.coords().expect("coords were asked for");
         let [width, height] = done.frame.size_px;
         for y in 0..height {
             for x in 0..width {
@@ -63,7 +63,7 @@ fn errors(scenario: Scenario, trajectory: Trajectory) -> (f64, f64, u32) {
                 let Some(exact) = closed_form(&done.plan, &sequence.path, [x, y], f64::from(phase)) else {
                     continue;
                 };
-                if done.frame.color_rgba[4 * i + 3] == 0.0 {
+                if done.frame.color_rgba()[4 * i + 3] == 0.0 {
                     panic!("pixel ({x}, {y}) has a source at {exact} but came out invalid");
                 }
                 let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
@@ -91,7 +91,7 @@ fn errors(scenario: Scenario, trajectory: Trajectory) -> (f64, f64, u32) {
 fn depth_error(scenario: Scenario, trajectory: Trajectory) -> (f64, usize, TemporalStage) {
     let sequence = sequence(scenario, trajectory, pattern(WIDTH_M));
     let done = render_at_phase(&engine(), &sequence, &[Channel::Depth], 0, 0.0);
-    let found = done.frame.depth_m.as_ref().expect("depth was asked for");
+    let found = done.frame.depth_m().expect("depth was asked for");
     let [width, height] = done.frame.size_px;
     let mut errors: Vec<f64> = (0..width * height)
         .filter_map(|i| {
@@ -212,7 +212,7 @@ fn texture_repeats_with_wrap_mode_repeat() {
             vertex.uv = vertex.uv.map(|t| 4.0 * t);
         }
         let sequence = sequence(scenario.clone(), steady(200.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
-        let color = render_at_phase(&engine, &sequence, &[Channel::Color], 0, 0.0).frame.color_rgba;
+        let color = render_at_phase(&engine, &sequence, &[Channel::Color], 0, 0.0).frame.into_color();
         let at = |x: usize, y: usize| color[4 * (y * 120 + x)];
         (0..90 * 70).map(|i| (at(i % 70, i / 70) - at(i % 70 + 50, i / 70)).abs()).fold(0.0, f32::max)
     };

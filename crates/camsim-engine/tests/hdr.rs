@@ -65,7 +65,7 @@ fn by_all(sequence: &Arc<Sequence>) -> Vec<(String, RenderedFrame)> {
 }
 
 fn numbers(frame: &RenderedFrame) -> &[u16] {
-    &frame.raw.as_ref().expect("a raw picture").values
+    &frame.raw().expect("a raw picture").values
 }
 
 /// Light of the glint's picture, in whites times pixels: without the ground's.
@@ -115,7 +115,7 @@ fn without_a_sensor_values_end_at_white() {
     let mut plain = Sequence::clone(&glint(1.0, WHITE_E));
     plain.scenario.camera.sensor = None;
     for (name, frame) in by_all(&Arc::new(plain)) {
-        let most = frame.color_rgba.iter().copied().fold(0.0, f32::max);
+        let most = frame.color_rgba().iter().copied().fold(0.0, f32::max);
         assert_eq!(most, 1.0, "{name}");
     }
 }

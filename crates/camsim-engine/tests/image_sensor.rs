@@ -46,13 +46,13 @@ fn by_oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
 fn every_renderer_gives_the_same_numbers() {
     let sequence = sky();
     let exact = by_oracle(&sequence);
-    let expected = exact.raw.as_ref().expect("a raw picture");
+    let expected = exact.raw().expect("a raw picture");
     assert_eq!((expected.channels, expected.values.len()), (1, 80 * 60));
     for place in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
         let mut engine = engine();
         engine.set_backend(place);
         let frame = render(&engine, &sequence, &[Channel::Color], 0).frame;
-        let raw = frame.raw.as_ref().expect("a raw picture");
+        let raw = frame.raw().expect("a raw picture");
         let different = raw.values.iter().zip(&expected.values).filter(|(a, b)| a != b).count();
         let largest = raw.values.iter().zip(&expected.values).map(|(a, b)| a.abs_diff(*b)).max();
         // Halves hold these colours; sums of their taps may round by 1e-7 of 3000 electrons.
@@ -68,7 +68,7 @@ fn a_twin_without_noise_keeps_its_exposure() {
         .expect("a twin");
     let frame = by_oracle(&Arc::new(twin));
     let levels = [0.25_f32, 0.5, 0.75];
-    let raw = frame.raw.expect("a raw picture");
+    let raw = frame.raw().expect("a raw picture");
     // Green, red; blue, green.
     for (i, &value) in raw.values.iter().enumerate() {
         let (x, y) = (i % 80, i / 80);

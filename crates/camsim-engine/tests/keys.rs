@@ -91,11 +91,11 @@ fn board_edges_are_exact_with_several_key_frames() {
         let near = expected(&sequence, &done.plan);
         let errors: Vec<f64> = near
             .iter()
-            .map(|&(i, share)| (share.x - f64::from(done.frame.color_rgba[4 * i])).abs())
+            .map(|&(i, share)| (share.x - f64::from(done.frame.color_rgba()[4 * i])).abs())
             .collect();
         let worst = errors.iter().copied().fold(0.0, f64::max);
         let covered: f64 = near.iter().map(|(_, share)| share.x).sum();
-        let found: f64 = near.iter().map(|&(i, _)| f64::from(done.frame.color_rgba[4 * i])).sum();
+        let found: f64 = near.iter().map(|&(i, _)| f64::from(done.frame.color_rgba()[4 * i])).sum();
         let psnr = linear_psnr(&done.frame, &near);
         eprintln!(
             "{name}: {} keys, {psnr:.1} dB, worst coverage error {worst:.3}, area {found:.1} of {covered:.1} \
@@ -178,7 +178,7 @@ fn sources_and_depths_over_buildings_are_exact() {
 
 /// Largest relative error of depth, 1 where only one of the two is sky.
 fn worst_depth(oracle: &Oracle, frame: &RenderedFrame) -> f64 {
-    let found = frame.depth_m.as_ref().expect("depth was asked for");
+    let found = frame.depth_m().expect("depth was asked for");
     let view = oracle.view(frame.index);
     let off = |(i, found): (u32, &f32)| {
         let pixel = [i % frame.size_px[0], i / frame.size_px[0]];
@@ -217,7 +217,7 @@ fn bytes_do_not_depend_on_the_order_of_frames_with_several_keys() {
         let mut frames = Vec::new();
         let mut sink = |done: camsim_engine::Finished| {
             assert_eq!(done.plan.keys.len(), 2);
-            frames.push((done.frame.index, done.frame.color_rgba, done.frame.coords));
+            frames.push((done.frame.index, done.frame.planes));
             Ok(())
         };
         session.render::<Infallible>(order, &mut sink).expect("render");

@@ -76,14 +76,14 @@ fn small_lamps_have_their_light() {
         for side_px in SIDES_PX {
             let sequence = lamps(side_px, streak_px, above_m, |_| {});
             let exact = Oracle::new(sequence.clone()).expect("an oracle");
-            let exact = shares(&exact.render(0, &RenderOptions::default()).color_rgba, side_px);
+            let exact = shares(&exact.render(0, &RenderOptions::default()).color_rgba(), side_px);
             eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, reference: {exact:.3?}");
             // Its samples are 1024 a pixel: 256 in all meet a lamp of half a pixel, with 6 % for random ones.
             assert!(worst(&exact) < 0.08, "{side_px} {streak_px} {above_m}: {exact:?}");
             for place in [Backend::Cpu, Backend::Gpu] {
                 let mut engine = engine();
                 engine.set_backend(place);
-                let found = render(&engine, &sequence, &[Channel::Color], 0).frame.color_rgba;
+                let found = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
                 let found = shares(&found, side_px);
                 eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, {place:?}: {found:.3?}");
                 assert!(worst(&found) < 0.04, "{side_px} {streak_px} {above_m}, {place:?}: {found:?}");
@@ -107,11 +107,11 @@ fn small_lamps_have_their_light_through_a_lens_and_a_readout() {
             });
             let options = RenderOptions { max_samples: 4096, ..RenderOptions::default() };
             let exact = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
-            let exact = shares(&exact.color_rgba, side_px);
+            let exact = shares(exact.color_rgba(), side_px);
             for place in [Backend::Cpu, Backend::Gpu] {
                 let mut engine = engine();
                 engine.set_backend(place);
-                let found = render(&engine, &sequence, &[Channel::Color], 0).frame.color_rgba;
+                let found = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
                 let found = shares(&found, side_px);
                 let share: [f64; 4] = std::array::from_fn(|i| found[i] / exact[i]);
                 eprintln!("{name}, {side_px} px, {place:?}: {share:.3?}");

@@ -75,8 +75,8 @@ fn pictures(sequence: &Arc<Sequence>) -> Pictures {
     let options =
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
     let truth = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
-    let depths_m = [done.frame.depth_m, truth.depth_m].map(|depth| depth.expect("depth"));
-    Pictures { colors: [done.frame.color_rgba, truth.color_rgba], depths_m, plan: done.plan }
+    let depths_m = [&done.frame, &truth].map(|frame| frame.depth_m().expect("depth").to_vec());
+    Pictures { colors: [done.frame.into_color(), truth.into_color()], depths_m, plan: done.plan }
 }
 
 fn standing(meshes: Vec<Mesh>) -> Arc<Sequence> {
@@ -154,7 +154,7 @@ fn blending_with_light_fog_and_emission() {
 fn paper_preset_blends() {
     let mut sequence = standing(vec![pane(RED, 0.3, 40.0), level(WALL, 1.0, 0.0)]);
     Arc::make_mut(&mut sequence).scenario.quality.preset = Preset::Paper;
-    let found = render(&engine(), &sequence, &[Channel::Color], 0).frame.color_rgba;
+    let found = render(&engine(), &sequence, &[Channel::Color], 0).frame.into_color();
     let at = 4 * (60 * 160 + 80);
     let found = DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(found[at + channel])));
     // Stored with 8 bits of sRGB, whose widest step is 0.009 of light, once for the wall and once for the

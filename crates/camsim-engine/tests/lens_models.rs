@@ -87,7 +87,7 @@ fn every_model_shows_what_the_reference_renderer_shows() {
         let oracle = Oracle::new(sequence.clone()).expect("an oracle");
         let options = RenderOptions { min_samples: 16, max_samples: 64, ..RenderOptions::default() };
         let exact = oracle.render(2, &options);
-        let pixels = || frame.color_rgba.chunks_exact(4).zip(exact.color_rgba.chunks_exact(4));
+        let pixels = || frame.color_rgba().chunks_exact(4).zip(exact.color_rgba().chunks_exact(4));
         let both = pixels().filter(|(a, b)| a[3] > 0.0 && b[3] > 0.0).count();
         let differ = pixels().filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();
         let squares: f64 = pixels()

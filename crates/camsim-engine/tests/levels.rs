@@ -127,8 +127,8 @@ fn draw(scene: &Scene, max_terrain_error_px: f64) -> (Drawn, Drawn) {
     let (error_m, error_px) = errors.fold((0.0_f64, 0.0_f64), |(m, px), of| (m.max(of.0), px.max(of.1)));
     let detail = ModelLod::new(scene, &levels, &pose, &tolerance);
     let device = Drawn {
-        color_rgba: done.frame.color_rgba,
-        depth_m: done.frame.depth_m.expect("depth"),
+        depth_m: done.frame.depth_m().expect("depth").to_vec(),
+        color_rgba: done.frame.into_color(),
         detail,
         error_m,
         error_px,
@@ -139,8 +139,8 @@ fn draw(scene: &Scene, max_terrain_error_px: f64) -> (Drawn, Drawn) {
     (
         device,
         Drawn {
-            color_rgba: truth.color_rgba,
-            depth_m: truth.depth_m.expect("depth"),
+            depth_m: truth.depth_m().expect("depth").to_vec(),
+            color_rgba: truth.into_color(),
             detail,
             error_m: 0.0,
             error_px: 0.0,

@@ -54,10 +54,10 @@ fn in_light(meshes: Vec<Mesh>, light: Option<Light>) -> Arc<Sequence> {
 /// The pictures of the device and of the oracle, R G B A.
 fn pictures(sequence: &Arc<Sequence>) -> [Vec<f32>; 2] {
     let channels = [Channel::Color];
-    let done = render(&engine(), sequence, &channels, 0).frame.color_rgba;
+    let done = render(&engine(), sequence, &channels, 0).frame.into_color();
     let options =
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
-    [done, Oracle::new(sequence.clone()).expect("an oracle").render(0, &options).color_rgba]
+    [done, Oracle::new(sequence.clone()).expect("an oracle").render(0, &options).into_color()]
 }
 
 fn psnr_db([a, b]: &[Vec<f32>; 2]) -> f64 {

@@ -61,10 +61,10 @@ fn compare(name: &str, meshes: Vec<Mesh>) -> (f64, f64) {
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
     let truth = Oracle::new(sequence).expect("an oracle").render(0, &options);
     let squares: f64 =
-        done.color_rgba.iter().zip(&truth.color_rgba).map(|(a, b)| f64::from(a - b).powi(2)).sum();
-    let psnr_db = -10.0 * (squares / done.color_rgba.len() as f64).log10();
-    let (found, exact) = (done.depth_m.expect("depth"), truth.depth_m.expect("depth"));
-    let other = found.iter().zip(&exact).filter(|(a, b)| (**a - **b).abs() > 1e-3 * b.abs().max(1.0)).count()
+        done.color_rgba().iter().zip(truth.color_rgba()).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let psnr_db = -10.0 * (squares / done.color_rgba().len() as f64).log10();
+    let (found, exact) = (done.depth_m().expect("depth"), truth.depth_m().expect("depth"));
+    let other = found.iter().zip(exact).filter(|(a, b)| (**a - **b).abs() > 1e-3 * b.abs().max(1.0)).count()
         as f64
         / found.len() as f64;
     let seen = exact.iter().filter(|depth| **depth > 0.0).count() as f64 / exact.len() as f64;

@@ -85,11 +85,11 @@ fn frames_with_moving_things_are_those_of_the_reference() {
         let with = camera(true, change);
         let oracle = Oracle::new(with.clone()).expect("a usable camera");
         let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
-        let expected = oracle.render(FRAME, &options).color_rgba;
+        let expected = oracle.render(FRAME, &options).into_color();
         let still = camera(false, change);
         for (renderer, engine) in [("cpu", &cpu), ("gpu", &gpu)] {
-            let found = render(engine, &with, &[Channel::Color], FRAME).frame.color_rgba;
-            let without = render(engine, &still, &[Channel::Color], FRAME).frame.color_rgba;
+            let found = render(engine, &with, &[Channel::Color], FRAME).frame.into_color();
+            let without = render(engine, &still, &[Channel::Color], FRAME).frame.into_color();
             let (gone_dn, painted) = difference(&found, &without);
             // The rest of the picture is that of the renderer without the roof.
             let patched = |source: &[f32]| {
@@ -128,12 +128,13 @@ fn a_fast_rotor_is_seen_all_around_and_what_is_out_of_view_changes_nothing() {
         Arc::new(Sequence { scene: Arc::new(scene), ..Sequence::clone(&still) })
     };
     let cpu = Engine::cpu();
-    let frame = |sequence: &Arc<Sequence>| render(&cpu, sequence, &[Channel::Color], FRAME).frame.color_rgba;
+    let frame =
+        |sequence: &Arc<Sequence>| render(&cpu, sequence, &[Channel::Color], FRAME).frame.into_color();
     let without = frame(&camera(false, |_| {}));
     let rotor = with_rotor(DVec3::new(10.0, 0.0, -40.0));
     let oracle = Oracle::new(rotor.clone()).expect("a usable camera");
     let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
-    let expected = oracle.render(FRAME, &options).color_rgba;
+    let expected = oracle.render(FRAME, &options).into_color();
     let found = frame(&rotor);
     let (error_dn, _) = difference(&found, &expected);
     let (gone_dn, _) = difference(&found, &without);
@@ -154,7 +155,7 @@ fn truth_of_moving_things_is_that_of_rays_at_their_instant() {
     let with = camera(true, |_| {});
     let oracle = Oracle::new(with.clone()).expect("a usable camera");
     let frame = render(&Engine::cpu(), &with, &[Channel::Depth, Channel::NormalWorld], FRAME).frame;
-    let depth_m = frame.depth_m.as_deref().expect("depth");
+    let depth_m = frame.depth_m().expect("depth");
     let (mut of_roof, mut wrong) = (0, 0);
     for (i, found_m) in depth_m.iter().enumerate() {
         let pixel = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];

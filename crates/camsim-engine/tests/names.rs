@@ -31,11 +31,14 @@ fn cameras_of_one_seed_have_independent_noise() {
     let of = |name: &str, place: Option<Backend>| {
         let sequence = grey(name);
         let Some(place) = place else {
-            return Oracle::new(sequence).expect("an oracle").render(0, &RenderOptions::default()).color_rgba;
+            return Oracle::new(sequence)
+                .expect("an oracle")
+                .render(0, &RenderOptions::default())
+                .into_color();
         };
         let mut engine = engine();
         engine.set_backend(place);
-        render(&engine, &sequence, &[Channel::Color], 0).frame.color_rgba
+        render(&engine, &sequence, &[Channel::Color], 0).frame.into_color()
     };
     let rms = |a: &[f32], b: &[f32]| {
         (a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (0.75 * a.len() as f64)).sqrt()

@@ -71,26 +71,27 @@ fn reference_agrees_with_global_shutter_frames_per_row() {
     let options =
         RenderOptions { channels: CHANNELS.to_vec(), tolerance_dn: 0.1, ..RenderOptions::default() };
     let truth = oracle.render(0, &options);
-    let (depths, coords) = (truth.depth_m.as_ref().expect("depth"), truth.coords.as_ref().expect("coords"));
+    let (depths, coords) = (truth.depth_m().expect("depth"), truth.coords().expect("coords"));
     let engine = engine();
     let (mut worst_point_px, mut worst_depth, mut squares, mut count) = (0.0_f64, 0.0_f64, 0.0, 0.0);
     // At the top, in the middle and at the bottom, which are 60 ms and 4 m apart.
     for row in [0_u32, 31, 75, 112, 149] {
         let t_s = 0.060 * ((f64::from(row) + 0.5) / 150.0 - 0.5) - 0.020;
         let done = render(&engine, &at_instant(t_s), &CHANNELS, 0).frame;
-        let (their_depths, their_coords) = (done.depth_m.expect("depth"), done.coords.expect("coords"));
+        let (their_depths, their_coords) = (done.depth_m().expect("depth"), done.coords().expect("coords"));
         for i in (row * 200) as usize..(row * 200 + 200) as usize {
             let point = |coords: &[f32; 8]| {
                 DVec3::new(f64::from(coords[5]), f64::from(coords[6]), f64::from(coords[7]))
             };
             let depth = f64::from(depths[i]);
-            assert!(depth > 100.0 && truth.color_rgba[4 * i + 3] == 1.0, "row {row}: {depth}");
+            assert!(depth > 100.0 && truth.color_rgba()[4 * i + 3] == 1.0, "row {row}: {depth}");
             worst_point_px =
                 worst_point_px.max(point(&coords[i]).distance(point(&their_coords[i])) / depth * 160.0);
             worst_depth = worst_depth.max((f64::from(their_depths[i]) / depth - 1.0).abs());
             for channel in 0..3 {
                 squares +=
-                    f64::from(truth.color_rgba[4 * i + channel] - done.color_rgba[4 * i + channel]).powi(2);
+                    f64::from(truth.color_rgba()[4 * i + channel] - done.color_rgba()[4 * i + channel])
+                        .powi(2);
                 count += 1.0;
             }
         }

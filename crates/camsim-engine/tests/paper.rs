@@ -56,8 +56,7 @@ fn the_paper_preset_agrees_with_its_twins() {
     let table = row_times(plan);
     let color = ColorImage { size_px: ideal.size_px, rgba: &stored };
     let camera = &plan.camera;
-    let (before, after) =
-        (done.frame.coords.as_ref().expect("asked for"), after.frame.coords.as_ref().expect("asked for"));
+    let (before, after) = (done.frame.coords().expect("asked for"), after.frame.coords().expect("asked for"));
     let (mut other_root, mut worst_ray_px, mut worst_px, mut worst_dn, mut compared, mut invalid) =
         (0, 0.0_f64, 0.0_f64, 0.0_f64, 0, 0);
     let mut square_dn = 0.0;
@@ -67,7 +66,7 @@ fn the_paper_preset_agrees_with_its_twins() {
         let expected = gauss_newton(&camera.lens, camera.distorted_from_pixel(pixel), camera.size_px);
         let pair = |c: &[f32; 8], k: usize| DVec2::new(f64::from(c[k]), f64::from(c[k + 1]));
         let uv = pair(&before[at], 0);
-        let valid = done.frame.color_rgba[4 * at + 3] > 0.0;
+        let valid = done.frame.color_rgba()[4 * at + 3] > 0.0;
         let last = DVec2::new(f64::from(ideal.size_px[0] - 1), f64::from(ideal.size_px[1] - 1));
         let nearest = |uv: DVec2| {
             let texel = (ideal.px_from_point(uv.extend(1.0)) + 0.5).floor().clamp(DVec2::ZERO, last);
@@ -102,7 +101,7 @@ fn the_paper_preset_agrees_with_its_twins() {
         let mean = gather_straight(found_ends, 12, &color);
         let expected = linear_fog(mean, sky, uv, nearest(uv), 1500.0);
         for (channel, expected) in expected.to_array().into_iter().enumerate() {
-            let error = f64::from(srgb_from_linear(done.frame.color_rgba[4 * at + channel])) - expected;
+            let error = f64::from(srgb_from_linear(done.frame.color_rgba()[4 * at + channel])) - expected;
             worst_dn = worst_dn.max(255.0 * error.abs());
             square_dn += (255.0 * error).powi(2);
         }
@@ -136,11 +135,16 @@ fn paper_preset_without_effects_keeps_colours() {
     };
     let (paper, own) = (still(Preset::Paper), still(Preset::Default));
     assert_eq!(paper.plan.ray, RayStage::Pinhole);
-    let levels: Vec<f32> = std::iter::zip(&paper.frame.color_rgba, &own.frame.color_rgba)
+    let levels: Vec<f32> = std::iter::zip(paper.frame.color_rgba(), own.frame.color_rgba())
         .map(|(found, expected)| 255.0 * (srgb_from_linear(*found) - srgb_from_linear(*expected)))
         .collect();
     let shown = |level: f32| {
-        paper.frame.color_rgba.iter().filter(|&&v| (srgb_from_linear(v) - level / 255.0).abs() < 0.1).count()
+        paper
+            .frame
+            .color_rgba()
+            .iter()
+            .filter(|&&v| (srgb_from_linear(v) - level / 255.0).abs() < 0.1)
+            .count()
     };
     assert!(shown(160.0) > 10_000 && shown(230.0) > 10_000, "one colour shows nothing");
     let mean = levels.iter().sum::<f32>() / levels.len() as f32;

@@ -139,7 +139,7 @@ fn frames_come_in_the_requested_order() {
         let (mut came, mut pictures) = (Vec::new(), Vec::new());
         let mut keep = |finished: Finished| {
             came.push(finished.frame.index);
-            pictures.push(finished.frame.color_rgba);
+            pictures.push(finished.frame.into_color());
             Ok(())
         };
         session.render::<Infallible>(order, &mut keep).expect("render");
@@ -169,7 +169,7 @@ fn frames_do_not_depend_on_the_number_of_threads() {
             let mut frames = Vec::new();
             let mut keep = |Finished { frame, plan, .. }: Finished| {
                 let plan = format!("{plan:?}");
-                frames.push((frame.index, frame.color_rgba, frame.depth_m, plan));
+                frames.push((frame.index, frame.planes, plan));
                 Ok(())
             };
             session.render::<Infallible>(0..12, &mut keep).expect("render");

@@ -84,7 +84,7 @@ fn measured_and_expected(log: &Path, t_s: f64) -> (f64, f64) {
         let sequence =
             Sequence { start_s: t_s, ..Sequence::in_memory(scenario, path.clone(), scene.clone(), 1) };
         let done = render(&engine, &Arc::new(sequence), &[Channel::Color], 0);
-        let points = line_columns(&done.frame.color_rgba, done.frame.size_px);
+        let points = line_columns(done.frame.color_rgba(), done.frame.size_px);
         assert!(points.len() > 200, "the line crosses the image: {} rows", points.len());
         // The middle half: there the line is straight to first order.
         let middle: Vec<_> = points.into_iter().filter(|p| (60.0..180.0).contains(&p.0)).collect();

@@ -44,7 +44,7 @@ fn psnr_db(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
         size_px: frame.size_px,
         channels: 4,
         alpha: Some(3),
-        samples: &frame.color_rgba,
+        samples: frame.color_rgba(),
     });
     compare(a, b).expect("one size").psnr_db()
 }
@@ -61,7 +61,7 @@ fn every_renderer_spreads_its_light() {
     };
     let (sharp, blurred) = (with(None), with(Some(spread())));
     let (exact_sharp, exact) = (by_oracle(&sharp), by_oracle(&blurred));
-    let valid = exact.color_rgba.chunks_exact(4).filter(|rgba| rgba[3] > 0.0).count();
+    let valid = exact.color_rgba().chunks_exact(4).filter(|rgba| rgba[3] > 0.0).count();
     assert!((4000..96 * 72).contains(&valid), "some corners have no ray: {valid}");
     let change_db = psnr_db(&exact, &exact_sharp);
     assert!(change_db < 35.0, "the picture changes: {change_db} dB");
@@ -91,7 +91,7 @@ fn light_is_spread_once_and_noise_is_not() {
         .expect("a point spread")
         .expose(&mut expected, None);
     let found = by_oracle(&noisy(Some(spread())));
-    assert_eq!(found.color_rgba, expected.color_rgba);
+    assert_eq!(found.color_rgba(), expected.color_rgba());
     // An ideal twin has neither; one without noise keeps the blur.
     let twin =
         |twin: TwinSpec| by_oracle(&Arc::new(noisy(Some(spread())).twin(&twin, None).expect("a twin")));
@@ -99,7 +99,7 @@ fn light_is_spread_once_and_noise_is_not() {
     let mut blurred = by_oracle(&clean);
     let camera = CameraSpec { point_spread: Some(spread()), ..clean.scenario.camera.clone() };
     Optics::new(&camera, 0).expect("a point spread").expose(&mut blurred, None);
-    assert_eq!(without_noise.color_rgba, blurred.color_rgba);
+    assert_eq!(without_noise.color_rgba(), blurred.color_rgba());
     let sharp = TwinSpec { noise: Some(false), point_spread: Some(false), ..TwinSpec::default() };
-    assert_eq!(twin(TwinSpec { name: "sharp".into(), ..sharp }).color_rgba, by_oracle(&clean).color_rgba);
+    assert_eq!(twin(TwinSpec { name: "sharp".into(), ..sharp }).color_rgba(), by_oracle(&clean).color_rgba());
 }

@@ -92,12 +92,12 @@ fn renewed_session_gives_the_frames_of_a_new_session() {
         for frame in [3, 9] {
             let renewed = next(&mut session, frame);
             let fresh = render(&engine, &changed, channels, frame).frame;
-            assert_eq!(renewed.color_rgba, fresh.color_rgba, "{what}: colour of frame {frame}");
-            assert_eq!(renewed.depth_m, fresh.depth_m, "{what}: depth of frame {frame}");
-            assert_eq!(renewed.coords, fresh.coords, "{what}: coordinates of frame {frame}");
+            assert_eq!(renewed.color_rgba(), fresh.color_rgba(), "{what}: colour of frame {frame}");
+            assert_eq!(renewed.depth_m(), fresh.depth_m(), "{what}: depth of frame {frame}");
+            assert_eq!(renewed.coords(), fresh.coords(), "{what}: coordinates of frame {frame}");
             if frame == 9 {
-                assert_ne!(renewed.color_rgba, last, "{what}: the change shows");
-                last = renewed.color_rgba;
+                assert_ne!(renewed.color_rgba(), last, "{what}: the change shows");
+                last = renewed.into_color();
             }
         }
     }
@@ -123,5 +123,5 @@ fn refused_sequence_leaves_the_session_unchanged() {
         ["camera.size_px is", "32768"]
     };
     assert!(expected.iter().all(|text| refused.contains(text)), "{refused}");
-    assert_eq!(next(&mut session, 3).color_rgba, render(&engine, &good, &COLOR, 3).frame.color_rgba);
+    assert_eq!(next(&mut session, 3).color_rgba(), render(&engine, &good, &COLOR, 3).frame.color_rgba());
 }

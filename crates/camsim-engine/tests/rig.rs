@@ -56,8 +56,8 @@ fn render(cameras: &[Loaded], frames: &[u64]) -> Vec<RenderedFrame> {
 /// Depth and point of a pixel.
 fn truth(frame: &RenderedFrame, x: u32, y: u32) -> (f64, DVec3) {
     let i = (y * frame.size_px[0] + x) as usize;
-    let [.., n, e, d] = frame.coords.as_ref().expect("coords")[i];
-    (f64::from(frame.depth_m.as_ref().expect("depth")[i]), DVec3::new(n.into(), e.into(), d.into()))
+    let [.., n, e, d] = frame.coords().expect("coords")[i];
+    (f64::from(frame.depth_m().expect("depth")[i]), DVec3::new(n.into(), e.into(), d.into()))
 }
 
 /// The point that a camera sees between four pixels; `None` beyond the pattern. Over a plane 1/Z and P/Z are

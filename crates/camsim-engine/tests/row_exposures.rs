@@ -53,8 +53,8 @@ fn flown(scenario: Scenario) -> Arc<Sequence> {
 /// Root mean square difference of colours in numbers of 255, and the largest difference in depth, over pixels of
 /// which both have a depth.
 fn compared(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
-    let squares = a.color_rgba.iter().zip(&b.color_rgba).map(|(a, b)| f64::from(a - b).powi(2));
-    let count = a.color_rgba.len() as f64;
+    let squares = a.color_rgba().iter().zip(b.color_rgba()).map(|(a, b)| f64::from(a - b).powi(2));
+    let count = a.color_rgba().len() as f64;
     255.0 * (squares.sum::<f64>() / count).sqrt()
 }
 
@@ -75,8 +75,8 @@ fn check(engine: &Engine, scenario: Scenario) {
         assert!((ours.t_mid_ns - theirs.t_mid_ns).abs() <= 1, "{name} {ours:?} {theirs:?}");
         assert!((ours.exposure_ns - theirs.exposure_ns).abs() <= 1, "{name} {ours:?} {theirs:?}");
     }
-    let (ours, theirs) = (done.depth_m.expect("depth"), truth.depth_m.expect("depth"));
-    let off = ours.iter().zip(&theirs).filter(|(a, b)| (*a / *b - 1.0).abs() > 1e-4).count();
+    let (ours, theirs) = (done.depth_m().expect("depth"), truth.depth_m().expect("depth"));
+    let off = ours.iter().zip(theirs).filter(|(a, b)| (*a / *b - 1.0).abs() > 1e-4).count();
     assert!(off <= ours.len() / 500, "{name}: {off} depths");
 }
 
@@ -120,7 +120,7 @@ fn light_grows_with_the_exposure() {
     for y in [0_usize, 44, 89] {
         // Exposures of 8 ms and 16/90 ms more from row to row.
         let wanted = 0.5 * 0.2 * (8.0 + 16.0 * y as f64 / 90.0) / 8.0;
-        let found = f64::from(frame.color_rgba[4 * (y * 120 + 60)]);
+        let found = f64::from(frame.color_rgba()[4 * (y * 120 + 60)]);
         assert!((found - wanted).abs() < 1e-6, "row {y}: {found} {wanted}");
     }
 }
@@ -134,14 +134,14 @@ fn the_mean_of_a_burst_is_the_frame_but_for_the_light_of_its_rows() {
     let sequence = flown(scenario);
     let twin = TwinSpec { name: "burst".into(), instants: Some(COUNT), ..TwinSpec::default() };
     let whole = render(&Engine::cpu(), &sequence, &[Channel::Color], 1).frame;
-    let mut mean = vec![0.0_f64; whole.color_rgba.len()];
+    let mut mean = vec![0.0_f64; whole.color_rgba().len()];
     for k in 0..COUNT {
         let picture = Arc::new(sequence.twin(&twin, Some(k)).expect("a usable shutter"));
         let frame = render(&Engine::cpu(), &picture, &[Channel::Color], 1).frame;
-        mean.iter_mut().zip(&frame.color_rgba).for_each(|(sum, c)| *sum += f64::from(*c) / f64::from(COUNT));
+        mean.iter_mut().zip(frame.color_rgba()).for_each(|(sum, c)| *sum += f64::from(*c) / f64::from(COUNT));
     }
     let mut squares = 0.0;
-    for (i, (mean, whole)) in mean.iter().zip(&whole.color_rgba).enumerate().filter(|(i, _)| i % 4 < 3) {
+    for (i, (mean, whole)) in mean.iter().zip(whole.color_rgba()).enumerate().filter(|(i, _)| i % 4 < 3) {
         let gain = 1.0 + 2.0 * (i / (4 * 120)) as f64 / 90.0;
         squares += (gain * mean - f64::from(*whole)).powi(2);
     }

@@ -92,7 +92,7 @@ fn shared_ideal_frame_is_drawn_once_with_exact_sources() {
             for phase in [0.0, -0.5] {
                 let done = render_at_phase(&engine, &sequence, &ALL, frame, phase);
                 assert!(
-                    done.frame.color_rgba == first.frame.color_rgba,
+                    done.frame.color_rgba() == first.frame.color_rgba(),
                     "{name}, {frame}: asking for the truth changes no colour"
                 );
                 let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
@@ -137,8 +137,8 @@ fn flight_of_its_own(sequence: &Sequence) -> Arc<Sequence> {
 /// RMS difference, 1/255 of the linear range.
 fn rms_dn(a: &Finished, b: &Finished) -> f64 {
     let squares: f64 =
-        a.frame.color_rgba.iter().zip(&b.frame.color_rgba).map(|(a, b)| f64::from(a - b).powi(2)).sum();
-    255.0 * (squares / (0.75 * a.frame.color_rgba.len() as f64)).sqrt()
+        a.frame.color_rgba().iter().zip(b.frame.color_rgba()).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    255.0 * (squares / (0.75 * a.frame.color_rgba().len() as f64)).sqrt()
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn sharing_depends_on_the_scenario_only() {
     let in_order = rendered(&engine, sequence, &[Channel::Color], 0..FRAMES);
     let shuffled = [9, 2, 15, 2, 7, 8, 0];
     for (frame, done) in shuffled.into_iter().zip(rendered(&engine, sequence, &[Channel::Color], shuffled)) {
-        assert!(done.frame.color_rgba == in_order[frame as usize].frame.color_rgba, "{frame}");
+        assert!(done.frame.color_rgba() == in_order[frame as usize].frame.color_rgba(), "{frame}");
     }
     let text = |plan: &FramePlan| format!("{plan:?}");
     let planner =

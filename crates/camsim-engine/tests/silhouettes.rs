@@ -162,7 +162,7 @@ fn ridge_depths_belong_to_one_ridge() {
         let done = render(&engine, &sequence, &[Channel::Depth], 0);
         let oracle = Oracle::new(sequence).expect("a usable camera");
         let view = oracle.view(0);
-        let depths = done.frame.depth_m.as_ref().expect("asked for");
+        let depths = done.frame.depth_m().expect("asked for");
         let (mut worst, mut sky) = (0.0_f64, 0);
         for (i, found) in (0..).zip(depths).map(|(i, found)| (i, f64::from(*found))) {
             let hit = view.sample([i % 120, i / 120], DVec2::ZERO, 0.0).and_then(|look| look.hit);
@@ -282,11 +282,11 @@ fn colours_do_not_depend_on_truth_channels() {
     assert_eq!(plain.plan.edges, EdgeStage::None);
     assert!(both.plan.edges == EdgeStage::None && both.plan.has_exact_truth());
     assert_eq!((plain.plan.keys.len(), plain.plan.temporal), (both.plan.keys.len(), both.plan.temporal));
-    assert!(plain.frame.color_rgba == both.frame.color_rgba, "depth changed colours");
+    assert!(plain.frame.color_rgba() == both.frame.color_rgba(), "depth changed colours");
     // What each pixel's own ray meets at mid-exposure, pixel by pixel.
     let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
     let view = oracle.view(0);
-    let depth_m = both.frame.depth_m.as_ref().expect("depth");
+    let depth_m = both.frame.depth_m().expect("depth");
     let [width, height] = both.frame.size_px;
     let differs = |&(x, y): &(u32, u32)| {
         let expected_m = view
@@ -333,7 +333,7 @@ fn bytes_do_not_depend_on_the_order_of_frames() {
             engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
         let mut frames = Vec::new();
         let mut sink = |done: Finished| {
-            frames.push((done.frame.index, done.frame.color_rgba));
+            frames.push((done.frame.index, done.frame.into_color()));
             Ok(())
         };
         session.render::<std::convert::Infallible>(order, &mut sink).expect("render");
@@ -376,7 +376,7 @@ fn single_pixel_frame_is_rendered() {
             scenario.quality.silhouettes = way;
             let sequence = sequence(scenario, steady(120.0, 0.0, velocity, rate), black_ground_and_roof());
             let done = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
-            let alpha: Vec<f32> = done.frame.color_rgba.chunks_exact(4).map(|pixel| pixel[3]).collect();
+            let alpha: Vec<f32> = done.frame.color_rgba().chunks_exact(4).map(|pixel| pixel[3]).collect();
             assert_eq!(
                 alpha,
                 vec![1.0; (size_px[0] * size_px[1]) as usize],

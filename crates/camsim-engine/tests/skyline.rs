@@ -58,7 +58,7 @@ fn skyline_is_exact_from_a_distant_ideal_frame() {
             engine.set_backend(place);
             let done = common::render(&engine, &sequence, &[Channel::Color], 0);
             let truth = Oracle::new(sequence).expect("oracle").render(0, &RenderOptions::default());
-            rms_dn(&done.frame.color_rgba, &truth.color_rgba)
+            rms_dn(done.frame.color_rgba(), truth.color_rgba())
         };
         for place in [Backend::GpuThenCpu, Backend::Gpu] {
             let [still, slow, fast] = [0.0, 30.0, 60.0].map(|speed_m_s| made(speed_m_s, place));
@@ -110,7 +110,7 @@ fn skyline_search_agrees_with_its_twin() {
                 [plan.sky_reach_px, 0.0].map(|reach_px| source_px(pixel, reach_px).expect("in view"));
             let of = |at_px: DVec2| color.sample(at_px).x;
             let [rendered, exact] =
-                [&done.frame, &truth].map(|frame| f64::from(frame.color_rgba[4 * i as usize]));
+                [&done.frame, &truth].map(|frame| f64::from(frame.color_rgba()[4 * i as usize]));
             // Of a kernel that reads more sharply or more softly than the twin here: what is sky or wall all
             // around is so for both.
             differ += u32::from((rendered - of(with)).abs() > 0.3);
@@ -142,9 +142,9 @@ fn sky_coordinates_are_exact_beside_surfaces() {
         };
         let exact = Oracle::new(sequence.clone()).expect("oracle").render(0, &options);
         let (exact_coords, exact_depth_m) =
-            (exact.coords.expect("asked for"), exact.depth_m.expect("asked for"));
+            (exact.coords().expect("asked for"), exact.depth_m().expect("asked for"));
         let (plan, coords, depth_m) =
-            (&done.plan, done.frame.coords.expect("asked for"), done.frame.depth_m.expect("asked for"));
+            (&done.plan, done.frame.coords().expect("asked for"), done.frame.depth_m().expect("asked for"));
         let mut sky = 0;
         for i in (0..SIZE_PX[0] * SIZE_PX[1]).filter(|&i| depth_m[i as usize] == 0.0) {
             let [x, y] = [i % SIZE_PX[0], i / SIZE_PX[0]];

@@ -41,8 +41,8 @@ fn linear_and_rk2_agree_with_their_twins() {
             let table = row_times(plan);
             let depth = InverseDepthImage { size_px: ideal.size_px, values: &values };
             let (mut worst_px, mut compared, mut most_steps) = (0.0_f64, 0, 0);
-            for (i, coords) in done.frame.coords.as_ref().expect("asked for").iter().enumerate() {
-                if done.frame.color_rgba[4 * i + 3] == 0.0 {
+            for (i, coords) in done.frame.coords().expect("asked for").iter().enumerate() {
+                if done.frame.color_rgba()[4 * i + 3] == 0.0 {
                     continue;
                 }
                 let line = i as u32 / plan.camera.size_px[0];

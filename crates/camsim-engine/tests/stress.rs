@@ -72,14 +72,14 @@ fn errors(sequence: &Arc<Sequence>, plane: Plane) -> (Errors, Finished) {
     let mut last = None;
     for phase in [-0.5, 0.0, 0.5] {
         let done = render_at_phase(&engine, sequence, &[Channel::Color, Channel::Coords], 0, phase);
-        let coords = done.frame.coords.as_ref().expect("coords were asked for");
+        let coords = done.frame.coords().expect("coords were asked for");
         let width = done.frame.size_px[0];
         for (i, found) in coords.iter().enumerate() {
             let pixel = [i as u32 % width, i as u32 / width];
             let Some(exact) = closed_form(&done.plan, &sequence.path, plane, pixel, f64::from(phase)) else {
                 continue;
             };
-            if done.frame.color_rgba[4 * i + 3] == 0.0 {
+            if done.frame.color_rgba()[4 * i + 3] == 0.0 {
                 missing += usize::from(done.plan.ideal.contains(exact));
                 continue;
             }

@@ -70,12 +70,12 @@ fn any_number_of_pixels_a_thread_gives_the_same_bytes() {
             sequence(scenario, steady(120.0, 10.0, DVec3::new(5.0, 30.0, 0.0), DVec3::ZERO), city(6));
         let (one, key) = frame(&sequence, channels, 1);
         assert!(key.caches_line_poses(), "{name}: nothing to be shared in {key:?}");
-        assert!(one.color_rgba.iter().any(|&value| value > 0.1), "{name}: a picture");
+        assert!(one.color_rgba().iter().any(|&value| value > 0.1), "{name}: a picture");
         for pixels in [3, 16, 1000] {
             let (several, _) = frame(&sequence, channels, pixels);
-            assert!(one.color_rgba == several.color_rgba, "{name}: colours of {pixels} pixels a thread");
+            assert!(one.color_rgba() == several.color_rgba(), "{name}: colours of {pixels} pixels a thread");
             assert!(
-                (&one.coords, &one.depth_m) == (&several.coords, &several.depth_m),
+                (one.coords(), one.depth_m()) == (several.coords(), several.depth_m()),
                 "{name}: truth of {pixels} pixels a thread"
             );
         }

@@ -108,10 +108,10 @@ fn a_twin_is_the_frame_of_a_scenario_with_its_keys() {
         let mut alone = base.clone();
         edit(&mut alone);
         let (twin, alone) = (twin(&base, &spec, None, &CHANNELS), frame(&alone, &CHANNELS));
-        assert_eq!(twin.color_rgba, alone.color_rgba, "{}", spec.name);
-        assert_eq!((twin.depth_m, twin.coords), (alone.depth_m, alone.coords), "{}", spec.name);
-        assert_eq!((twin.rows, twin.stamp_ns), (alone.rows, own.stamp_ns), "{}", spec.name);
-        assert_ne!(twin.color_rgba, own.color_rgba, "{}", spec.name);
+        assert_eq!(twin.color_rgba(), alone.color_rgba(), "{}", spec.name);
+        assert_eq!((twin.depth_m(), twin.coords()), (alone.depth_m(), alone.coords()), "{}", spec.name);
+        assert_eq!((&twin.rows, twin.stamp_ns), (&alone.rows, own.stamp_ns), "{}", spec.name);
+        assert_ne!(twin.color_rgba(), own.color_rgba(), "{}", spec.name);
     }
 }
 
@@ -125,7 +125,7 @@ fn a_still_camera_has_global_twins_equal_to_its_frame() {
         let twin = twin(&still, &spec, None, &[Channel::Color]);
         // Plans of cameras with and without a readout may differ by rounding of the poses.
         let worst =
-            own.color_rgba.iter().zip(&twin.color_rgba).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            own.color_rgba().iter().zip(twin.color_rgba()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst < 1e-5, "{instant:?}: {worst}");
     }
 }
@@ -169,10 +169,10 @@ fn pictures_are_exposed_at_their_instants() {
 /// PSNR of the mean of pictures against another, dB, over valid pixels.
 fn psnr_db(pictures: &[RenderedFrame], blurred: &RenderedFrame) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for (i, wanted) in blurred.color_rgba.iter().enumerate().filter(|(i, _)| i % 4 != 3) {
+    for (i, wanted) in blurred.color_rgba().iter().enumerate().filter(|(i, _)| i % 4 != 3) {
         let alpha = i - i % 4 + 3;
-        if pictures.iter().chain([blurred]).all(|picture| picture.color_rgba[alpha] > 0.0) {
-            let mean = pictures.iter().map(|picture| f64::from(picture.color_rgba[i])).sum::<f64>()
+        if pictures.iter().chain([blurred]).all(|picture| picture.color_rgba()[alpha] > 0.0) {
+            let mean = pictures.iter().map(|picture| f64::from(picture.color_rgba()[i])).sum::<f64>()
                 / pictures.len() as f64;
             sum += (mean - f64::from(*wanted)).powi(2);
             count += 1.0;
@@ -208,10 +208,10 @@ fn pictures_of_a_burst_have_noise_of_their_own() {
     let mut still = flight([DVec3::ZERO, DVec3::ZERO]);
     still.scenario.camera.photometric.noise_sigma = 0.02;
     let burst = TwinSpec { instants: Some(2), ..spec("burst") };
-    let [a, b] = [0, 1].map(|k| twin(&still, &burst, Some(k), &[Channel::Color]).color_rgba);
+    let [a, b] = [0, 1].map(|k| twin(&still, &burst, Some(k), &[Channel::Color]).into_color());
     assert_ne!(a, b);
     let clean = TwinSpec { noise: Some(false), ..burst };
-    let [a, b] = [0, 1].map(|k| twin(&still, &clean, Some(k), &[Channel::Color]).color_rgba);
+    let [a, b] = [0, 1].map(|k| twin(&still, &clean, Some(k), &[Channel::Color]).into_color());
     assert_eq!(a, b);
 }
 
@@ -226,7 +226,7 @@ fn global_flow_leads_to_the_same_point_in_the_global_twin() {
         let spec = TwinSpec { shutter: Some(TwinShutter::Global), instant: Some(instant), ..spec("global") };
         let twin = twin(&base, &spec, None, &[Channel::Color, Channel::Coords]);
         let point = |frame: &RenderedFrame, i: usize| {
-            let c = frame.coords.as_ref().expect("asked for")[i];
+            let c = frame.coords().expect("asked for")[i];
             DVec3::new(f64::from(c[5]), f64::from(c[6]), f64::from(c[7]))
         };
         let flow = own.floats(Channel::FlowGlobal).expect("asked for");

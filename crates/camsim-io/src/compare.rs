@@ -311,10 +311,8 @@ mod tests {
         let spec = OutputSpec { format: vec![ImageFormat::Exr, ImageFormat::Png], ..OutputSpec::default() };
         let mut writer = FrameWriter::new(FrameFiles::new(folder, &spec, OutputEncoding::Linear8), 1);
         for index in 0..frames {
-            let color_rgba = (0..width * 12).flat_map(|_| [value, value, value, 1.0]).collect();
-            writer
-                .write(RenderedFrame { index, size_px: [width, 12], color_rgba, ..RenderedFrame::default() })
-                .unwrap();
+            let color = (0..width * 12).flat_map(|_| [value, value, value, 1.0]).collect();
+            writer.write(RenderedFrame { index, ..RenderedFrame::picture([width, 12], color) }).unwrap();
         }
         writer.finish().unwrap();
     }

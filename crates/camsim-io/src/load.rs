@@ -336,7 +336,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
         }
     };
     let numbers_objects =
-        |channel: Channel| matches!(channel, Channel::Object | Channel::Class | Channel::Coverage);
+        |channel: Channel| channel.kind() == PlaneKind::Index || channel == Channel::Coverage;
     if scene.objects.len() > MAX_OBJECTS && scenario.output.all_channels().any(numbers_objects) {
         return Err(LoadError::TooManyObjects(scene.objects.len()));
     }
@@ -375,7 +375,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     warnings.extend(sensor_warnings(scenario, &log, &sequence.path.trajectory));
     warnings.extend(scene_notes.iter().cloned());
     let output = &scenario.output;
-    let has_numbers = output.channels.iter().any(|channel| channel.plane() == Some(PlaneKind::Index));
+    let has_numbers = output.channels.iter().any(|channel| channel.kind() == PlaneKind::Index);
     warnings.extend(
         (output.palette && !has_numbers).then(|| {
             "output.palette colours nothing: output.channels has neither object nor class".to_owned()

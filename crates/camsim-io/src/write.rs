@@ -49,6 +49,8 @@ use thiserror::Error;
 
 mod atomic;
 mod channel_pictures;
+#[cfg(test)]
+mod channels_page;
 mod encode;
 mod exr_file;
 mod frame_table;

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use camsim_core::{
     apply::{NoSourceCounts, Pipeline, Settings},
-    frame::RenderedFrame,
+    frame::{Plane, RenderedFrame},
     scenario::OutputEncoding,
 };
 use camsim_io::{frame_file::read_frame, scenario_file::read_checked_camera, write::write_picture};
@@ -136,13 +136,14 @@ fn row_s(y: u32) -> f64 {
 fn apply(exposure_s: f64, folder: &Path) -> (RenderedFrame, NoSourceCounts) {
     let [width, height] = IDEAL_PX;
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (f64::from(x), f64::from(y))));
-    let mut ideal =
-        RenderedFrame { size_px: IDEAL_PX, depth_m: Some(Vec::new()), ..RenderedFrame::default() };
+    let (mut color_rgba, mut depth_m) = (Vec::new(), Vec::new());
     for (x, y) in pixels {
         let ray = ((DVec2::new(x, y) - IDEAL_CENTRE) / IDEAL_FOCAL).extend(1.0);
-        ideal.color_rgba.extend([x as f32 / 512.0, y as f32 / 512.0, 0.0, 1.0]);
-        ideal.depth_m.as_mut().unwrap().push(cast(DVec3::ZERO, ray).unwrap().1.z as f32);
+        color_rgba.extend([x as f32 / 512.0, y as f32 / 512.0, 0.0, 1.0]);
+        depth_m.push(cast(DVec3::ZERO, ray).unwrap().1.z as f32);
     }
+    let planes = vec![Plane::color(color_rgba), Plane::depth(depth_m)];
+    let ideal = RenderedFrame { size_px: IDEAL_PX, planes, ..RenderedFrame::default() };
     write_picture(&folder.join("ideal.exr"), &ideal, OutputEncoding::Srgb8).unwrap();
     let frame = format!(
         "color = \"ideal.exr\"\ndepth = \"ideal.exr\"\nfocal_px = [{IDEAL_FOCAL:?}, \
@@ -169,7 +170,7 @@ fn apply(exposure_s: f64, folder: &Path) -> (RenderedFrame, NoSourceCounts) {
 /// Source of an output pixel, from its colour.
 fn rendered_source_px(frame: &RenderedFrame, x: u32, y: u32) -> Option<DVec2> {
     let first = 4 * (y * OUT_PX[0] + x) as usize;
-    let [r, g, _, alpha] = frame.color_rgba[first..first + 4] else { panic!("four values") };
+    let [r, g, _, alpha] = frame.color_rgba()[first..first + 4] else { panic!("four values") };
     (alpha > 0.0).then(|| DVec2::new(f64::from(r), f64::from(g)) * 512.0)
 }
 

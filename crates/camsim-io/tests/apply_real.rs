@@ -125,7 +125,7 @@ fn warped(set: &FrameSeries, data: &Path, from: usize, to: usize) -> (RenderedFr
 /// Number of pixels with depth in both frames, the share whose depths agree within 5 %, and their median
 /// difference of colour.
 fn agreement(rendered: &RenderedFrame, own: &FrameFile) -> (usize, f64, f32) {
-    let depth_m = rendered.depth_m.as_ref().unwrap();
+    let depth_m = rendered.depth_m().unwrap();
     let both: Vec<usize> =
         (0..depth_m.len()).filter(|&i| depth_m[i] > 0.0 && own.frame.inverse_depth[i] > 0.0).collect();
     let agree: Vec<usize> = both
@@ -135,7 +135,7 @@ fn agreement(rendered: &RenderedFrame, own: &FrameFile) -> (usize, f64, f32) {
         .collect();
     let color = |i: &usize| {
         (0..3)
-            .map(|c| (rendered.color_rgba[4 * i + c] - own.frame.color_rgba[4 * i + c]).abs())
+            .map(|c| (rendered.color_rgba()[4 * i + c] - own.frame.color_rgba[4 * i + c]).abs())
             .fold(0.0, f32::max)
     };
     let mut differences: Vec<f32> = agree.iter().map(color).collect();

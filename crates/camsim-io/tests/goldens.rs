@@ -295,7 +295,7 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// Grey levels of a rendered pixel, rounded as in a PNG; `None` where alpha is 0.
 fn rendered_levels(frame: &RenderedFrame, i: usize) -> Option<[f64; 3]> {
-    let p = &frame.color_rgba[4 * i..4 * i + 4];
+    let p = &frame.color_rgba()[4 * i..4 * i + 4];
     (p[3] > 0.0).then(|| [p[0], p[1], p[2]].map(|v| f64::from((255.0 * srgb_from_linear(v)).round())))
 }
 

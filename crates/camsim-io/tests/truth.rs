@@ -45,11 +45,11 @@ fn source_coordinates_are_pixels_of_the_camera_in_frames_csv() {
         RenderOptions { channels: CHANNELS.to_vec(), key, max_samples: 1, ..RenderOptions::default() };
     let frame = oracle.render(7, &options);
     let source = SourceFrame::new(plan.ideal_view(), plan.key_s, sequence.epoch_ns);
-    let (depths, coords) = (frame.depth_m.unwrap(), frame.coords.unwrap());
+    let (depths, coords) = (frame.depth_m().unwrap(), frame.coords().unwrap());
     let (mut ground, mut sky, mut none) = (0, 0, 0);
     for (i, [_, _, x, y, dt_s, n, e, d]) in coords.iter().map(|pixel| pixel.map(f64::from)).enumerate() {
         let vector = DVec3::new(n, e, d);
-        if frame.color_rgba[4 * i + 3] == 0.0 {
+        if frame.color_rgba()[4 * i + 3] == 0.0 {
             assert_eq!(coords[i], [0.0; 8]);
             none += 1;
             continue;

@@ -84,7 +84,7 @@ fn line_error(
     let light = |at: [i64; 2]| -> Option<f64> {
         let inside = (0..2).all(|k| (0..i64::from(frame.size_px[k])).contains(&at[k]));
         let index = 4 * (at[1] * i64::from(frame.size_px[0]) + at[0]);
-        if inside { frame.color_rgba.get(index as usize).map(|&v| f64::from(v)) } else { None }
+        if inside { frame.color_rgba().get(index as usize).map(|&v| f64::from(v)) } else { None }
     };
     // Where the edge crosses the middle of the line of pixels.
     let (mut low, mut high) = (0.0, 1.0);

@@ -49,7 +49,9 @@ pub use camera::{
     Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout,
     Reset, ShutterSpec, VibrationSpec, ZoomSpec,
 };
-pub use channel::{Channel, FlowInstant, FlowState, PlaneKind};
+pub use channel::{
+    CHANNELS, Channel, ChannelFacts, ChannelSource, Check, Colors, FlowInstant, FlowState, PlaneKind,
+};
 pub use dataset::DatasetFormat;
 pub use face::Face;
 pub use file_list::FileList;

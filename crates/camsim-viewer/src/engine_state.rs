@@ -161,7 +161,7 @@ impl EngineState {
         }
         let index = shown.reply.pictures.iter().position(|picture| picture.stage == stage)?;
         let (picture, image) = (shown.reply.pictures.get(index)?, shown.images.get(index)?);
-        let (size_px, color_rgba) = (picture.frame.size_px, &picture.frame.color_rgba);
+        let (size_px, color_rgba) = (picture.frame.size_px, picture.frame.color_rgba());
         let errors = shown.reply.errors.get(index).map(|errors| &**errors).zip(shown.errors.get(index));
         let depth = shown.reply.depths.get(index).map(|depth| &**depth).zip(shown.depths.get(index));
         Some(StagePicture { image, size_px, color_rgba, stage, plan: Some(&picture.plan), errors, depth })

@@ -86,5 +86,5 @@ pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
 fn picture(board: &Board) -> RenderedFrame {
     let texture = board.picture();
     let color_rgba = texture.rgba8.iter().map(|&byte| f32::from(byte) / 255.0).collect();
-    RenderedFrame { index: 0, stamp_ns: 0, size_px: texture.size_px, color_rgba, ..RenderedFrame::default() }
+    RenderedFrame::picture(texture.size_px, color_rgba)
 }

@@ -60,5 +60,6 @@ fn validity_warnings(sky_only: u64, empty: u64, frames: usize) -> impl Iterator<
 
 /// Whether no pixel of a frame's colour is valid; false for a frame without colour.
 fn is_empty(frame: &RenderedFrame) -> bool {
-    !frame.color_rgba.is_empty() && frame.color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
+    let color_rgba = frame.color_rgba();
+    !color_rgba.is_empty() && color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
 }

@@ -9,7 +9,7 @@ use anyhow::anyhow;
 use camsim_core::{
     mount::CameraPath,
     pose::BodyState,
-    scenario::{Channel, Scenario, TrajectorySpan},
+    scenario::{Channel, PlaneKind, Scenario, TrajectorySpan},
     sequence::Sequence,
     shutter::Shutter,
     trajectory::Trajectory,
@@ -43,8 +43,8 @@ const CAMERA_TRAJECTORY_CSV: &str = "camera_trajectory.csv";
 
 /// Whether a scenario writes numbers of objects or classes.
 fn numbers_objects(scenario: &Scenario) -> bool {
-    let of_objects = |channel: &Channel| matches!(channel, Channel::Object | Channel::Class);
-    scenario.output.channels.iter().any(of_objects) && !scenario.output.format.is_empty()
+    let has_numbers = |channel: &Channel| channel.kind() == PlaneKind::Index;
+    scenario.output.channels.iter().any(has_numbers) && !scenario.output.format.is_empty()
 }
 
 /// Removes the table of objects of another scenario.

@@ -120,10 +120,14 @@ fn no_motion_is_the_identity() {
             );
         }
         let rendered = pipeline.render(None);
-        let worst =
-            rendered.color_rgba.iter().zip(&ideal.color_rgba).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let worst = rendered
+            .color_rgba()
+            .iter()
+            .zip(&ideal.color_rgba)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max);
         assert!(worst < 1e-6, "{which:?}: {worst}");
-        let depth_m = rendered.depth_m.unwrap();
+        let depth_m = rendered.depth_m().unwrap();
         assert!(depth_m.iter().zip(&ideal.inverse_depth).all(|(z, w)| if *w == 0.0 {
             *z == 0.0
         } else {
@@ -187,7 +191,7 @@ fn blur_is_the_mean_along_the_path() {
     let by_paper = Pipeline::new(&spec, &ideal, &motion, &paper).unwrap().render(None);
     for (x, y) in [(60_u32, 45_u32), (30, 20), (100, 80)] {
         let value = |frame: &RenderedFrame, channel: usize| {
-            f64::from(frame.color_rgba[4 * (y * 120 + x) as usize + channel])
+            f64::from(frame.color_rgba()[4 * (y * 120 + x) as usize + channel])
         };
         let expected = 0.5 + 0.2 * (f64::from(x) - 59.5) / 100.0;
         assert!((value(&rendered, 0) - expected).abs() < 1e-5, "{} {expected}", value(&rendered, 0));
@@ -215,7 +219,7 @@ fn rotation_during_the_exposure_is_an_arc() {
         let u = (f64::from(x) - 80.0) / 100.0;
         // Mean of u cos(phi) over the arc.
         let expected = 0.5 + 0.2 * u * half.sin() / half;
-        let value = f64::from(rendered.color_rgba[4 * (80 * 161 + x) as usize]);
+        let value = f64::from(rendered.color_rgba()[4 * (80 * 161 + x) as usize]);
         assert!((value - expected).abs() < 2e-5, "{x}: {value} {expected}");
     }
 }
@@ -238,7 +242,7 @@ fn linear_fog_needs_the_paper_preset() {
         .unwrap()
         .render(None);
     let slant = (1.0_f64 + 0.15 * 0.15 + 0.1 * 0.1).sqrt();
-    assert!((f64::from(srgb_from_linear(rendered.color_rgba[2])) - 0.7 * 0.5 * slant).abs() < 1e-6);
+    assert!((f64::from(srgb_from_linear(rendered.color_rgba()[2])) - 0.7 * 0.5 * slant).abs() < 1e-6);
 }
 
 #[test]
@@ -266,7 +270,7 @@ fn invalid_frames_are_refused() {
         camera([4, 3], 10.0, ShutterSpec { readout_ms: 33.0, exposure_ms: 20.0, ..ShutterSpec::default() });
     for which in [Solver::Linear, Solver::Rk2, Solver::Reproject] {
         assert_eq!(
-            Pipeline::new(&blurred, &good, &about, &solver(which)).unwrap().render(None).color_rgba,
+            Pipeline::new(&blurred, &good, &about, &solver(which)).unwrap().render(None).into_color(),
             [0.0; 48]
         );
     }
@@ -286,7 +290,7 @@ fn rays_into_holes_are_empty_and_counted() {
         let pipeline = Pipeline::new(&spec, &ideal, &still, &solver(which)).unwrap();
         let (rendered, counts) = pipeline.render_and_count(None);
         assert_eq!(counts, NoSourceCounts { holes: 10 * 20, ..NoSourceCounts::default() }, "{which:?}");
-        let alpha = |x: usize| rendered.color_rgba[4 * (60 * 7 + x) + 3];
+        let alpha = |x: usize| rendered.color_rgba()[4 * (60 * 7 + x) + 3];
         assert_eq!(
             (24..36).map(alpha).collect::<Vec<_>>(),
             [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.],

@@ -86,7 +86,7 @@ fn render(sequence: &Arc<Sequence>, frame: u64) -> RenderedFrame {
 fn mean(frame: &RenderedFrame) -> f64 {
     let luminance =
         |rgba: &[f32]| f64::from(0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]) * f64::from(rgba[3]);
-    let pixels = frame.color_rgba.chunks_exact(4);
+    let pixels = frame.color_rgba().chunks_exact(4);
     let count: f64 = pixels.clone().map(|rgba| f64::from(rgba[3])).sum();
     pixels.map(luminance).sum::<f64>() / count
 }
@@ -128,7 +128,8 @@ fn the_meter_sees_what_an_image_sensor_counts() {
     let sequence = sequence_of(scenario, None);
     let track = track(&sequence);
     for frame in [0, 90, 200] {
-        let raw = render(&sequence, frame).raw.expect("a raw picture");
+        let rendered = render(&sequence, frame);
+        let raw = rendered.raw().expect("a raw picture");
         let found: f64 = raw.values.iter().map(|&dn| (f64::from(dn) - 100.0) / 3995.0).sum();
         let (found, metered) = (found / raw.values.len() as f64, track.level(frame));
         assert!((metered / found - 1.0).abs() < 0.02, "{frame}: {metered} {found}");

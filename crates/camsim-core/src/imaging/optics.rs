@@ -135,7 +135,7 @@ impl Optics {
     /// Spreads the light of a frame, and applies the simple model's light and noise unless the camera has a
     /// sensor. `exposure` is the frame's own, where automatic exposure sets it.
     pub fn expose(&self, frame: &mut RenderedFrame, exposure: Option<&FrameExposure>) {
-        self.spread(&mut frame.color_rgba);
+        self.spread(frame.color_rgba_mut());
         if let Some(simple) = &self.simple {
             simple.expose(frame, exposure);
         }
@@ -181,7 +181,7 @@ impl SimpleModel {
         let stage = Photometry::whole(camera, exposure);
         let picture = picture_of(camera, *seed, frame.index) as u32;
         let seed = camera_seed(*seed, &camera.name);
-        let rows = frame.color_rgba.par_chunks_mut(RGBA * camera.size_px[0] as usize).enumerate();
+        let rows = frame.color_rgba_mut().par_chunks_mut(RGBA * camera.size_px[0] as usize).enumerate();
         rows.for_each(|(y, row)| {
             for (x, rgba) in row.chunks_exact_mut(RGBA).enumerate().filter(|(_, rgba)| rgba[3] > 0.0) {
                 let (pixel, color) = ([x as u32, y as u32], [rgba[0], rgba[1], rgba[2]]);

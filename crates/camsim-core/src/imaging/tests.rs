@@ -136,10 +136,9 @@ fn light_saturates_at_the_full_well() {
     let spec = ImageSensorSpec { full_well_e: Some(1000.0), bits: Some(8), ..mono(5000.0) };
     let sensor = ImageSensor::new(&camera([20, 10], spec), 5).expect("valid");
     assert!(sensor.raw(0, 0.0, &flat([20, 10], 1.0)).values.iter().all(|&v| v == 255));
-    let mut frame =
-        RenderedFrame { color_rgba: flat([20, 10], 1.0), size_px: [20, 10], ..RenderedFrame::default() };
+    let mut frame = RenderedFrame::picture([20, 10], flat([20, 10], 1.0));
     sensor.expose(&mut frame, 0.0, None);
-    assert!(frame.color_rgba.iter().all(|&v| v == 1.0));
+    assert!(frame.color_rgba().iter().all(|&v| v == 1.0));
 }
 
 #[test]
@@ -157,17 +156,16 @@ fn threads_and_repetition_change_no_bit() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("valid");
         pool.install(|| {
             let sensor = ImageSensor::new(&camera(size_px, spec.clone()), 5).expect("valid");
-            let mut frame =
-                RenderedFrame { index: 4, color_rgba: light.clone(), size_px, ..RenderedFrame::default() };
+            let mut frame = RenderedFrame { index: 4, ..RenderedFrame::picture(size_px, light.clone()) };
             sensor.expose(&mut frame, 0.0, None);
             frame
         })
     };
     let (one, many) = (run(1), run(5));
-    assert_eq!(one.raw, many.raw);
-    assert_eq!(one.color_rgba, many.color_rgba);
+    assert_eq!(one.raw(), many.raw());
+    assert_eq!(one.color_rgba(), many.color_rgba());
     // FNV-1a of the numbers: the same on every machine.
-    let hash = one.raw.expect("valid").values.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, value| {
+    let hash = one.raw().expect("valid").values.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, value| {
         (hash ^ u64::from(*value)).wrapping_mul(0x0000_0100_0000_01b3)
     });
     assert_eq!(hash, 0x03a3_f0e4_22fb_601c, "{hash:#x}");
@@ -217,10 +215,10 @@ fn a_frame_of_its_own_exposure_is_that_of_a_sensor_with_it() {
     };
     let picture = |spec: ImageSensorSpec, exposure: Option<&FrameExposure>| {
         let light: Vec<f32> = (0..96 * 64).flat_map(|i| [(i % 96) as f32 / 20.0; 4]).collect();
-        let mut frame = RenderedFrame { index: 5, size_px, color_rgba: light, ..RenderedFrame::default() };
+        let mut frame = RenderedFrame { index: 5, ..RenderedFrame::picture(size_px, light) };
         let sensor = ImageSensor::new(&camera(size_px, spec), 3).expect("valid");
         sensor.expose(&mut frame, 0.123, exposure);
-        (frame.raw.expect("a raw picture").values, frame.color_rgba)
+        (frame.raw().expect("a raw picture").values.clone(), frame.into_color())
     };
     let (found, expected) = (picture(spec.clone(), Some(&exposure)), picture(own, None));
     assert!(found == expected && found != picture(spec, None));

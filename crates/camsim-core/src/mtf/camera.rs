@@ -152,13 +152,13 @@ pub fn slanted_edge(camera: &CameraSpec) -> Result<EdgePicture, EdgeError> {
     };
     let mut frame = Oracle::new(sequence)?.render(0, &options);
     if let Some(optics) = Optics::new(&window, 0) {
-        optics.spread(&mut frame.color_rgba);
+        optics.spread(frame.color_rgba_mut());
     }
     // The border repeats its pixels, and not the edge.
     let reach_px = LensTransfer::new(camera).reach_px()[1].ceil() as usize;
     let rows = reach_px.min(side / 4)..side - reach_px.min(side / 4);
     let of = |channel: usize| {
-        let pixels = frame.color_rgba.chunks_exact(4).skip(rows.start * side).take(rows.len() * side);
+        let pixels = frame.color_rgba().chunks_exact(4).skip(rows.start * side).take(rows.len() * side);
         pixels.map(|rgba| f64::from(rgba[channel])).collect()
     };
     Ok(EdgePicture { size: [side, rows.len()], channels: [0, 1, 2].map(of) })

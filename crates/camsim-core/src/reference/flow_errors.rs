@@ -8,22 +8,22 @@ use serde::Serialize;
 
 use super::{
     Oracle, RaySample,
-    flow::FlowPicture,
     plane_errors::{Compared, at_share, beside_offsets},
+    planes::{self, PlaneOracle},
 };
 use crate::{
     frame::RenderedFrame,
-    scenario::{Channel, FlowState},
+    scenario::{Channel, Check, FlowState},
     silhouette::may_step,
 };
 
 /// Distance beyond which a flow or a blur path is wrong, pixels.
 pub const FLOW_TOLERANCE_PX: f64 = 0.01;
-/// Part of its length by which a motion may be off, and what is added to it, pixels a second.
-const MOTION_TOLERANCE: (f64, f64) = (1e-3, 0.05);
+/// Fraction of its length by which a motion may be off, and what is added to it, pixels a second.
+pub const MOTION_TOLERANCE: (f64, f64) = (1e-3, 0.05);
 /// Difference of a coverage from that by the oracle's 256 rays from which on it is wrong: the largest error of
 /// 64 rays at a straight border is 0.1, and that of the oracle half of it.
-const COVERAGE_TOLERANCE: f64 = 0.15;
+pub const COVERAGE_TOLERANCE: f64 = 0.15;
 /// States of a flow.
 const STATES: usize = 5;
 
@@ -78,15 +78,6 @@ pub struct CoverageErrors {
     pub faults: u64,
 }
 
-/// Whether [`flow_errors`] compares the plane of a channel.
-#[must_use]
-pub fn is_flow(channel: Channel) -> bool {
-    matches!(
-        channel,
-        Channel::Flow | Channel::FlowBack | Channel::FlowGlobal | Channel::Motion | Channel::BlurPath
-    )
-}
-
 /// What a frame has, or should have, at a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Value {
@@ -103,9 +94,9 @@ struct PixelError {
     is_fault: bool,
 }
 
-/// Compares the planes of frame `number` that [`is_flow`] names in `most` of its pixels, evenly chosen. Where
-/// they differ, the surroundings within `near_px` of the pixel's centre decide whether that is a fault, because
-/// both sides of a border that near are acceptable. Empty if the size differs from that of the sequence.
+/// Compares the planes of frame `number` that hold displacements or velocities in `most` of its pixels, evenly
+/// chosen. Where they differ, the surroundings within `near_px` of the pixel's centre decide whether that is a
+/// fault, because both sides of a border that near are acceptable. Empty if the size differs from that of the sequence.
 #[must_use]
 pub fn flow_errors(
     oracle: &Oracle,
@@ -114,18 +105,22 @@ pub fn flow_errors(
     near_px: f64,
     most: usize,
 ) -> Vec<FlowErrors> {
-    let channels: Vec<Channel> =
-        frame.planes.iter().map(|plane| plane.channel).filter(|&channel| is_flow(channel)).collect();
+    let is_flow = |channel: &Channel| matches!(channel.facts().check, Check::Displacement | Check::Velocity);
+    let channels: Vec<Channel> = frame.planes.iter().map(|plane| plane.channel).filter(is_flow).collect();
     let compared = if channels.is_empty() { None } else { Compared::new(oracle, number, frame, near_px) };
     let Some(compared) = compared else { return Vec::new() };
     let valid: Vec<usize> = (0..compared.samples.len()).filter(|&i| compared.samples[i].is_some()).collect();
     let chosen = chosen(&valid, most);
     let errors = |&channel: &Channel| {
         let values = frame.floats(channel)?;
-        let parts = values.len().checked_div(compared.samples.len())?;
-        let flows = Flows { channel, picture: oracle.flow_picture(number, channel) };
-        let of_pixel =
-            |&i: &usize| flows.error(&compared, i, value(channel, &values[parts * i..parts * (i + 1)]));
+        let parts = channel.components().len();
+        if values.len() != parts * compared.samples.len() {
+            return None;
+        }
+        let flows = Flows { parts, check: channel.facts().check, oracle: compared.oracle(channel) };
+        let found =
+            |i: usize| std::array::from_fn(|k| if k < parts { values[parts * i + k].into() } else { 0.0 });
+        let of_pixel = |&i: &usize| flows.error(&compared, i, displacement(found(i), parts));
         let pixels: Vec<PixelError> = chosen.par_iter().filter_map(of_pixel).collect();
         Some(errors_of(channel, valid.len() as u64, &pixels))
     };
@@ -142,19 +137,19 @@ fn chosen(valid: &[usize], most: usize) -> Vec<usize> {
     valid.iter().copied().filter(|&i| hash(i).wrapping_mul(0xbf58_476d_1ce4_e5b9) < limit).collect()
 }
 
-fn value(channel: Channel, parts: &[f32]) -> Value {
-    let part = |k: usize| parts.get(k).copied().map_or(f64::NAN, f64::from);
-    let first = DVec2::new(part(0), part(1));
-    match channel {
-        Channel::BlurPath => Value { shifts: [first, DVec2::new(part(2), part(3))], state: 0 },
-        Channel::Motion => Value { shifts: [first; 2], state: 0 },
-        _ => Value { shifts: [first; 2], state: (part(2) as usize).min(STATES - 1) },
+/// A value of so many parts: one displacement, two, or one with a state.
+fn displacement([x0, y0, x1, y1]: planes::Value, parts: usize) -> Value {
+    let first = DVec2::new(x0, y0);
+    match parts {
+        2 => Value { shifts: [first; 2], state: 0 },
+        3 => Value { shifts: [first; 2], state: (x1 as usize).min(STATES - 1) },
+        _ => Value { shifts: [first, DVec2::new(x1, y1)], state: 0 },
     }
 }
 
 fn errors_of(channel: Channel, of_pixels: u64, pixels: &[PixelError]) -> FlowErrors {
     let mut states = [[0; STATES]; STATES];
-    if !matches!(channel, Channel::Motion | Channel::BlurPath) {
+    if channel.components().contains(&"state") {
         pixels.iter().for_each(|pixel| states[pixel.states[0]][pixel.states[1]] += 1);
     }
     let count =
@@ -186,21 +181,22 @@ fn errors_of(channel: Channel, of_pixels: u64, pixels: &[PixelError]) -> FlowErr
 
 /// A channel of a frame, by the oracle.
 struct Flows<'a> {
-    channel: Channel,
-    picture: Option<FlowPicture<'a>>,
+    parts: usize,
+    check: Check,
+    oracle: PlaneOracle<'a>,
 }
 
 impl Flows<'_> {
     fn error(&self, compared: &Compared<'_>, i: usize, found: Value) -> Option<PixelError> {
         let seen = compared.samples[i].as_ref()?;
         let pixel = compared.pixel(i);
-        let wanted = self.value(compared, pixel, DVec2::ZERO, seen);
+        let wanted = self.value(pixel, DVec2::ZERO, seen);
         let error = distance(wanted, found);
         let is_beyond = !self.is_same(wanted, found);
         let has_beside = || {
             beside_offsets(compared.near_px).any(|offset| {
                 let beside = compared.view.sample(pixel, offset, 0.0);
-                beside.is_some_and(|seen| self.is_same(self.value(compared, pixel, offset, &seen), found))
+                beside.is_some_and(|seen| self.is_same(self.value(pixel, offset, &seen), found))
             })
         };
         Some(PixelError {
@@ -212,21 +208,13 @@ impl Flows<'_> {
         })
     }
 
-    fn value(&self, compared: &Compared<'_>, pixel: [u32; 2], offset: DVec2, seen: &RaySample) -> Value {
-        let from_px = DVec2::from_array(pixel.map(f64::from)) + offset;
-        match (&self.picture, self.channel) {
-            (Some(picture), _) => {
-                let (shift, state) = picture.flow(from_px, seen);
-                Value { shifts: [shift; 2], state: state as usize }
-            }
-            (None, Channel::Motion) => Value { shifts: [compared.view.motion(seen); 2], state: 0 },
-            (None, _) => Value { shifts: compared.view.blur_path(from_px, seen), state: 0 },
-        }
+    fn value(&self, pixel: [u32; 2], offset: DVec2, seen: &RaySample) -> Value {
+        displacement(self.oracle.value(pixel, offset, seen), self.parts)
     }
 
     fn is_same(&self, wanted: Value, found: Value) -> bool {
-        let allowed = match self.channel {
-            Channel::Motion => MOTION_TOLERANCE.0 * wanted.shifts[0].length() + MOTION_TOLERANCE.1,
+        let allowed = match self.check {
+            Check::Velocity => MOTION_TOLERANCE.0 * wanted.shifts[0].length() + MOTION_TOLERANCE.1,
             _ => FLOW_TOLERANCE_PX,
         };
         wanted.state == found.state && distance(wanted, found).is_none_or(|error| error <= allowed)

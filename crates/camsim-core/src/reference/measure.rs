@@ -177,17 +177,17 @@ fn compared(
     frame: &RenderedFrame,
     step: u32,
 ) -> Option<CoordErrors> {
-    let coords = frame.coords.as_ref()?;
+    let (coords, color_rgba) = (frame.coords()?, frame.color_rgba());
     let [width, height] = frame.size_px;
     let pixels = width as usize * height as usize;
     if frame.size_px != oracle.sequence.scenario.camera.size_px
         || coords.len() != pixels
-        || frame.color_rgba.len() != 4 * pixels
+        || color_rgba.len() != 4 * pixels
     {
         return None;
     }
     let compare = |i: usize| {
-        let valid = frame.color_rgba[4 * i + 3] > 0.0;
+        let valid = color_rgba[4 * i + 3] > 0.0;
         match (&samples[i], valid) {
             (None, false) => ComparedPixel::Skipped,
             (None, true) => ComparedPixel::FalselyValid,
@@ -249,12 +249,13 @@ pub struct ImageErrors {
 /// frame. `None` if the sizes differ.
 #[must_use]
 pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool]) -> Option<ImageErrors> {
-    let same = truth.size_px == frame.size_px && truth.color_rgba.len() == frame.color_rgba.len();
-    if !same || 4 * near.len() != truth.color_rgba.len() {
+    let (exact, found) = (truth.color_rgba(), frame.color_rgba());
+    let same = truth.size_px == frame.size_px && exact.len() == found.len();
+    if !same || 4 * near.len() != exact.len() {
         return None;
     }
     let (mut squares, mut pixels, mut max) = ([0.0_f64; 2], [0_u64; 2], 0.0_f64);
-    for ((a, b), near) in truth.color_rgba.chunks_exact(4).zip(frame.color_rgba.chunks_exact(4)).zip(near) {
+    for ((a, b), near) in exact.chunks_exact(4).zip(found.chunks_exact(4)).zip(near) {
         if a[3] <= 0.0 || b[3] <= 0.0 {
             continue;
         }

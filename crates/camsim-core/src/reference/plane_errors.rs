@@ -4,18 +4,20 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{DEPTH_TOLERANCE, FrameView, Oracle, RaySample};
+use super::{
+    DEPTH_TOLERANCE, FrameView, Oracle, RaySample,
+    planes::{PlaneOracle, Value},
+};
 use crate::{
     frame::{Plane, PlaneValues, RenderedFrame},
-    scenario::Channel,
-    scene::Scene,
+    scenario::{Channel, Check},
 };
 
 /// Angle beyond which a normal is wrong, radians: 0.1 degrees.
 pub const NORMAL_TOLERANCE_RAD: f64 = 0.1 / 180.0 * std::f64::consts::PI;
 /// Number of directions in which the surroundings of a pixel are sampled.
 const DIRECTIONS: u32 = 16;
-/// Distances of those samples, as shares of the largest. Distant terrain has triangles of a few thousandths
+/// Distances of those samples, as fractions of the largest. Distant terrain has triangles of a few thousandths
 /// of a pixel, whose normals differ.
 const RINGS: [f64; 5] = [1e-3, 0.03, 0.3, 0.65, 1.0];
 
@@ -43,34 +45,30 @@ pub struct PlaneErrors {
     pub max: f64,
 }
 
-/// Whether [`plane_errors`] compares the plane of a channel.
-#[must_use]
-pub fn is_compared(channel: Channel) -> bool {
-    matches!(
-        channel,
-        Channel::Range | Channel::Normal | Channel::NormalWorld | Channel::Object | Channel::Class
-    )
+/// What a value may be off by, in channels that [`plane_errors`] compares.
+fn tolerance(channel: Channel) -> Option<f64> {
+    match channel.facts().check {
+        Check::Relative => Some(DEPTH_TOLERANCE),
+        Check::Direction => Some(NORMAL_TOLERANCE_RAD),
+        Check::Exact => Some(0.0),
+        _ => None,
+    }
 }
 
-/// Compares the planes of frame `number` that [`is_compared`] names with the sample at the centre of each
-/// pixel at mid-exposure. Where they differ, surfaces within `near_px` of the centre are sampled as well,
-/// because both sides of a border that near are acceptable. Empty if the size differs from that of the
+/// Compares the planes of frame `number` that hold a range, a unit vector or a number with the sample at the
+/// centre of each pixel at mid-exposure. Where they differ, surfaces within `near_px` of the centre are sampled
+/// as well, because both sides of a border that near are acceptable. Empty if the size differs from that of the
 /// sequence.
 #[must_use]
 pub fn plane_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Vec<PlaneErrors> {
     let Some(compared) = Compared::new(oracle, number, frame, near_px) else { return Vec::new() };
-    frame
-        .planes
-        .iter()
-        .filter(|plane| is_compared(plane.channel))
-        .filter_map(|plane| compared.errors(plane))
-        .collect()
+    frame.planes.iter().filter_map(|plane| compared.errors(plane, tolerance(plane.channel)?)).collect()
 }
 
 /// What all planes of a frame are compared with.
 pub(super) struct Compared<'a> {
+    number: u64,
     pub(super) view: FrameView<'a>,
-    scene: &'a Scene,
     pub(super) size_px: [u32; 2],
     /// The ray of each pixel that is valid in both.
     pub(super) samples: Vec<Option<RaySample>>,
@@ -93,60 +91,66 @@ struct PixelError {
     is_fault: bool,
 }
 
-/// A value of a plane.
-#[derive(Clone, Copy)]
-enum Value {
-    /// A range or a normal.
-    Floats(DVec3),
-    Number(u32),
-}
-
 impl<'a> Compared<'a> {
     /// `None` if the frame's size differs from that of the sequence.
     pub(super) fn new(oracle: &'a Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Option<Self> {
         let [width, height] = frame.size_px;
         let count = width as usize * height as usize;
-        if frame.size_px != oracle.sequence.scenario.camera.size_px || frame.color_rgba.len() != 4 * count {
+        let color_rgba = frame.color_rgba();
+        if frame.size_px != oracle.sequence.scenario.camera.size_px || color_rgba.len() != 4 * count {
             return None;
         }
         let view = oracle.view(number);
         let pixel = |i: usize| [i as u32 % width, i as u32 / width];
         let sample =
-            |i: usize| view.sample(pixel(i), DVec2::ZERO, 0.0).filter(|_| frame.color_rgba[4 * i + 3] > 0.0);
+            |i: usize| view.sample(pixel(i), DVec2::ZERO, 0.0).filter(|_| color_rgba[4 * i + 3] > 0.0);
         let samples: Vec<Option<RaySample>> = (0..count).into_par_iter().map(sample).collect();
-        Some(Self { view, scene: &oracle.sequence.scene, size_px: frame.size_px, samples, near_px })
+        Some(Self { number, view, size_px: frame.size_px, samples, near_px })
     }
 
     pub(super) fn pixel(&self, i: usize) -> [u32; 2] {
         [i as u32 % self.size_px[0], i as u32 / self.size_px[0]]
     }
 
-    fn errors(&self, plane: &Plane) -> Option<PlaneErrors> {
-        let components = match plane.channel {
-            Channel::Normal | Channel::NormalWorld => 3,
-            _ => 1,
-        };
-        let length = match &plane.values {
-            PlaneValues::Float(values) => values.len(),
-            PlaneValues::Index(values) => values.len(),
-        };
-        if length != components * self.samples.len() {
+    /// A channel of the frame by the oracle.
+    pub(super) fn oracle(&self, channel: Channel) -> PlaneOracle<'_> {
+        PlaneOracle::new(&self.view, self.number, channel)
+    }
+
+    fn errors(&self, Plane { channel, values }: &Plane, tolerance: f64) -> Option<PlaneErrors> {
+        let (channel, components) = (*channel, channel.components().len().max(1));
+        if values.len() != components * self.samples.len() {
             return None;
         }
-        let value = |i: usize| match &plane.values {
-            PlaneValues::Index(values) => Value::Number(values[i]),
-            PlaneValues::Float(values) => {
-                let part =
-                    |k: usize| if k < components { f64::from(values[components * i + k]) } else { 0.0 };
-                Value::Floats(DVec3::new(part(0), part(1), part(2)))
-            }
+        let value = |i: usize| -> Value {
+            let part = |k: usize| match values {
+                PlaneValues::Float(values) => f64::from(values[components * i + k]),
+                PlaneValues::Index(values) => f64::from(values[i]),
+                PlaneValues::Raw(raw) => f64::from(raw.values[i]),
+            };
+            std::array::from_fn(|k| if k < components { part(k) } else { 0.0 })
+        };
+        let oracle = self.oracle(channel);
+        let error = |i: usize, offset: DVec2, sample: &RaySample| {
+            let wanted = oracle.value(self.pixel(i), offset, sample);
+            error(channel.facts().check, value(i), wanted, sample.hit.is_some())
+        };
+        // Whether a surface near a pixel's centre has the value.
+        let has_beside = |i: usize| {
+            beside_offsets(self.near_px).any(|offset| {
+                let beside = self.view.sample(self.pixel(i), offset, 0.0);
+                beside.is_some_and(|beside| error(i, offset, &beside) <= tolerance)
+            })
         };
         let of_pixel = |i: usize| {
-            let sample = self.samples[i].as_ref()?;
-            let error = self.error(plane.channel, value(i), sample);
-            let is_beyond = is_beyond(plane.channel, error);
-            let is_fault = is_beyond && !self.has_beside(plane.channel, i, value(i));
-            Some(PixelError { error, is_beyond, is_away: self.is_away(i), is_fault })
+            let error = error(i, DVec2::ZERO, self.samples[i].as_ref()?);
+            let is_beyond = error > tolerance;
+            Some(PixelError {
+                error,
+                is_beyond,
+                is_away: self.is_away(i),
+                is_fault: is_beyond && !has_beside(i),
+            })
         };
         let pixels: Vec<PixelError> = (0..self.samples.len()).into_par_iter().filter_map(of_pixel).collect();
         let mut sorted: Vec<f64> = pixels.iter().map(|pixel| pixel.error).collect();
@@ -155,7 +159,7 @@ impl<'a> Compared<'a> {
         let number =
             |counts: &dyn Fn(&PixelError) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
         Some(PlaneErrors {
-            channel: plane.channel,
+            channel,
             pixels: pixels.len() as u64,
             beyond: number(&|pixel| pixel.is_beyond),
             pixels_away: number(&|pixel| pixel.is_away),
@@ -166,46 +170,6 @@ impl<'a> Compared<'a> {
         })
     }
 
-    /// Error of a value against a sample. Values that are not numbers are infinitely wrong.
-    fn error(&self, channel: Channel, value: Value, sample: &RaySample) -> f64 {
-        let hit = sample.hit.as_ref();
-        let error = match (channel, value, hit) {
-            (Channel::Object, Value::Number(number), _) => {
-                let wanted = hit.map_or(0, |hit| self.scene.object_of_surface(hit.surface));
-                if number == wanted { 0.0 } else { f64::INFINITY }
-            }
-            (_, Value::Number(number), _) => {
-                let wanted = hit.map_or(0, |hit| self.scene.class_of_surface(hit.surface));
-                if number == wanted { 0.0 } else { f64::INFINITY }
-            }
-            (_, Value::Floats(value), None) => {
-                if value == DVec3::ZERO {
-                    0.0
-                } else {
-                    f64::INFINITY
-                }
-            }
-            (Channel::Range, Value::Floats(value), Some(hit)) => {
-                let wanted_m = hit.point_ned_m.distance(sample.pose.position_ned_m);
-                if value.x > 0.0 { (value.x - wanted_m).abs() / wanted_m } else { f64::INFINITY }
-            }
-            (_, Value::Floats(value), Some(hit)) => {
-                let wanted =
-                    if channel == Channel::Normal { sample.normal_camera(hit) } else { hit.normal_ned };
-                angle(value, wanted)
-            }
-        };
-        if error.is_nan() { f64::INFINITY } else { error }
-    }
-
-    /// Whether a surface near a pixel's centre has a value.
-    fn has_beside(&self, channel: Channel, i: usize, value: Value) -> bool {
-        beside_offsets(self.near_px).any(|offset| {
-            let beside = self.view.sample(self.pixel(i), offset, 0.0);
-            beside.is_some_and(|beside| !is_beyond(channel, self.error(channel, value, &beside)))
-        })
-    }
-
     /// Whether all pixels around one show the same object.
     pub(super) fn is_away(&self, i: usize) -> bool {
         self.around(i).all(|beside| self.object(beside) == self.object(i))
@@ -213,9 +177,9 @@ impl<'a> Compared<'a> {
 
     /// Object that a pixel's centre sees; `None` without a ray.
     pub(super) fn object(&self, i: usize) -> Option<u32> {
-        let of_hit = |sample: &RaySample| {
-            sample.hit.as_ref().map_or(0, |hit| self.scene.object_of_surface(hit.surface))
-        };
+        let scene = &self.view.oracle.sequence.scene;
+        let of_hit =
+            |sample: &RaySample| sample.hit.as_ref().map_or(0, |hit| scene.object_of_surface(hit.surface));
         self.samples[i].as_ref().map(of_hit)
     }
 
@@ -236,13 +200,17 @@ pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
     sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
 }
 
-fn is_beyond(channel: Channel, error: f64) -> bool {
-    error
-        > match channel {
-            Channel::Range => DEPTH_TOLERANCE,
-            Channel::Normal | Channel::NormalWorld => NORMAL_TOLERANCE_RAD,
-            _ => 0.0,
-        }
+/// Error of a value; infinite for what is not a number, and where one of the two is the sky.
+fn error(check: Check, value: Value, wanted: Value, is_surface: bool) -> f64 {
+    let vector = |[x, y, z, _]: Value| DVec3::new(x, y, z);
+    let error = match check {
+        Check::Relative if is_surface && value[0] > 0.0 => (value[0] - wanted[0]).abs() / wanted[0],
+        Check::Direction if is_surface => angle(vector(value), vector(wanted)),
+        Check::Relative if is_surface => f64::INFINITY,
+        _ if value == wanted => 0.0,
+        _ => f64::INFINITY,
+    };
+    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 /// Angle between a vector and one of length 1, radians; infinite for a vector of another length. A triangle

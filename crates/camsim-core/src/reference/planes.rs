@@ -10,18 +10,29 @@ use super::{
 };
 use crate::{
     frame::{Plane, PlaneValues},
-    scenario::Channel,
+    scenario::{Channel, ChannelSource, PlaneKind},
 };
 
 /// Rays of a pixel for [`Channel::Coverage`].
 const COVERAGE_RAYS: u32 = 256;
 
+/// Values of a channel at a pixel: its components, or a number, and 0 in what is left.
+pub(super) type Value = [f64; 4];
+
+/// A channel of a frame by the oracle's rays.
+pub(super) struct PlaneOracle<'a> {
+    channel: Channel,
+    view: &'a FrameView<'a>,
+    /// The picture that a flow leads to.
+    picture: Option<FlowPicture<'a>>,
+}
+
 impl Oracle {
-    /// Planes of the channels that have one.
+    /// Planes of the channels that rays give.
     pub(super) fn planes(&self, frame: u64, options: &RenderOptions) -> Vec<Plane> {
         let mut channels: Vec<Channel> = Vec::new();
         for &channel in &options.channels {
-            if channel.plane().is_some() && !channels.contains(&channel) {
+            if channel.facts().source == ChannelSource::Rays && !channels.contains(&channel) {
                 channels.push(channel);
             }
         }
@@ -38,106 +49,88 @@ impl Oracle {
             .into_par_iter()
             .map(|i| is_wanted(i).then(|| view.sample(pixel(i), DVec2::ZERO, 0.0)).flatten())
             .collect();
-        let floats = |value: &(dyn Fn(&RaySample, &Hit) -> DVec3 + Sync), components: usize| {
-            let of_pixel = |sample: &Option<RaySample>| {
-                let seen = sample.as_ref().and_then(|sample| Some((sample, sample.hit.as_ref()?)));
-                seen.map_or(DVec3::ZERO, |(sample, hit)| value(sample, hit)).as_vec3().to_array()
+        let plane = |&channel: &Channel| {
+            let oracle = PlaneOracle::new(&view, frame, channel);
+            let value = |(i, sample): (usize, &Option<RaySample>)| {
+                sample.as_ref().map_or([0.0; 4], |seen| oracle.value(pixel(i), DVec2::ZERO, seen))
             };
-            let values = samples.iter().map(of_pixel);
-            PlaneValues::Float(values.flat_map(|value| value.into_iter().take(components)).collect())
+            let values = samples.par_iter().enumerate().map(value);
+            let values = match channel.kind() {
+                PlaneKind::Index => PlaneValues::Index(values.map(|[number, ..]| number as u32).collect()),
+                _ => {
+                    let count = channel.components().len();
+                    let floats = |value: Value| value.map(|part| part as f32).into_iter().take(count);
+                    PlaneValues::Float(values.flat_map_iter(floats).collect())
+                }
+            };
+            Plane { channel, values }
         };
-        let numbers = |number: &dyn Fn(u32) -> u32| {
-            let seen = samples.iter().map(|sample| sample.and_then(|sample| sample.hit));
-            PlaneValues::Index(seen.map(|hit| hit.map_or(0, |hit| number(hit.surface))).collect())
+        channels.iter().map(plane).collect()
+    }
+}
+
+impl<'a> PlaneOracle<'a> {
+    pub(super) fn new(view: &'a FrameView<'a>, frame: u64, channel: Channel) -> Self {
+        let oracle = view.oracle;
+        let output = &oracle.sequence.scenario.output;
+        let step = i64::from(output.flow_step);
+        let picture = match channel {
+            Channel::Flow => Some(oracle.flow_frame(frame as i64 + step)),
+            Channel::FlowBack => Some(oracle.flow_frame(frame as i64 - step)),
+            Channel::FlowGlobal => Some(oracle.flow_global(frame, output.flow_instant)),
+            _ => None,
         };
-        let scene = &self.sequence.scene;
-        let values = |channel: Channel| match channel {
-            Channel::Range => {
-                floats(&|sample, hit| DVec3::X * hit.point_ned_m.distance(sample.pose.position_ned_m), 1)
+        Self { channel, view, picture }
+    }
+
+    /// What a ray through a pixel, `offset` from its centre, sees.
+    pub(super) fn value(&self, pixel: [u32; 2], offset: DVec2, seen: &RaySample) -> Value {
+        let scene = &self.view.oracle.sequence.scene;
+        let from_px = DVec2::from_array(pixel.map(f64::from)) + offset;
+        let one = |value: f64| [value, 0.0, 0.0, 0.0];
+        let hit = seen.hit.as_ref();
+        let number = |of: &dyn Fn(u32) -> u32| one(hit.map_or(0.0, |hit| f64::from(of(hit.surface))));
+        let vector = |vector: DVec3| [vector.x, vector.y, vector.z, 0.0];
+        match self.channel {
+            Channel::Range => one(hit.map_or(0.0, |hit| hit.point_ned_m.distance(seen.pose.position_ned_m))),
+            Channel::Normal => {
+                vector(hit.map_or(DVec3::ZERO, |hit| seen.pose.ned_from_camera.conjugate() * hit.normal_ned))
             }
-            Channel::Normal => floats(&|sample, hit| sample.normal_camera(hit), 3),
-            Channel::NormalWorld => floats(&|_, hit| hit.normal_ned, 3),
-            Channel::Object => numbers(&|surface| scene.object_of_surface(surface)),
-            Channel::Class => numbers(&|surface| scene.class_of_surface(surface)),
-            Channel::Flow | Channel::FlowBack | Channel::FlowGlobal | Channel::Motion | Channel::BlurPath => {
-                self.flow_plane(frame, channel, &view, &samples)
+            Channel::NormalWorld => vector(hit.map_or(DVec3::ZERO, |hit| hit.normal_ned)),
+            Channel::Object => number(&|surface| scene.object_of_surface(surface)),
+            Channel::Class => number(&|surface| scene.class_of_surface(surface)),
+            Channel::Coverage => one(self.view.coverage(pixel, seen)),
+            Channel::Flow | Channel::FlowBack | Channel::FlowGlobal => {
+                let Some(picture) = &self.picture else { return [0.0; 4] };
+                let (shift, state) = picture.flow(from_px, seen);
+                [shift.x, shift.y, f64::from(state as u8), 0.0]
+            }
+            Channel::Motion => {
+                let px_s = self.view.motion(seen);
+                [px_s.x, px_s.y, 0.0, 0.0]
+            }
+            Channel::BlurPath => {
+                let [begin, end] = self.view.blur_path(from_px, seen);
+                [begin.x, begin.y, end.x, end.y]
             }
             Channel::Color
             | Channel::Depth
             | Channel::Valid
             | Channel::Rows
             | Channel::Raw
-            | Channel::Coords => PlaneValues::Float(Vec::new()),
-            Channel::Coverage => PlaneValues::Float(
-                samples
-                    .par_iter()
-                    .enumerate()
-                    .map(|(i, sample)| sample.map_or(0.0, |sample| view.coverage(pixel(i), &sample) as f32))
-                    .collect(),
-            ),
-        };
-        channels.iter().map(|&channel| Plane { channel, values: values(channel) }).collect()
-    }
-}
-
-impl Oracle {
-    /// Flows, motion or blur path of all samples.
-    fn flow_plane(
-        &self,
-        frame: u64,
-        channel: Channel,
-        view: &FrameView<'_>,
-        samples: &[Option<RaySample>],
-    ) -> PlaneValues {
-        let width = self.sequence.scenario.camera.size_px[0];
-        let picture = self.flow_picture(frame, channel);
-        let of_pixel = |(i, sample): (usize, &Option<RaySample>)| {
-            let from_px = DVec2::new(f64::from(i as u32 % width), f64::from(i as u32 / width));
-            let pair = |px: DVec2| px.as_vec2().to_array();
-            match (channel, sample, &picture) {
-                (_, Some(seen), Some(picture)) => {
-                    let (shift, state) = picture.flow(from_px, seen);
-                    let [dx, dy] = pair(shift);
-                    vec![dx, dy, f32::from(state as u8)]
-                }
-                (Channel::Motion, Some(seen), None) => pair(view.motion(seen)).to_vec(),
-                (_, Some(seen), None) => view.blur_path(from_px, seen).map(pair).concat(),
-                (Channel::Motion, None, _) => vec![0.0; 2],
-                (Channel::BlurPath, None, _) => vec![0.0; 4],
-                (_, None, _) => vec![0.0; 3],
-            }
-        };
-        PlaneValues::Float(samples.par_iter().enumerate().flat_map_iter(of_pixel).collect())
-    }
-
-    /// The picture that a flow of a frame leads to; `None` for other channels.
-    pub(super) fn flow_picture(&self, frame: u64, channel: Channel) -> Option<FlowPicture<'_>> {
-        let output = &self.sequence.scenario.output;
-        let step = i64::from(output.flow_step);
-        match channel {
-            Channel::Flow => Some(self.flow_frame(frame as i64 + step)),
-            Channel::FlowBack => Some(self.flow_frame(frame as i64 - step)),
-            Channel::FlowGlobal => Some(self.flow_global(frame, output.flow_instant)),
-            _ => None,
+            | Channel::Coords => [0.0; 4],
         }
     }
 }
 
-impl RaySample {
-    /// Normal of the surface in optical camera axes.
-    pub(super) fn normal_camera(&self, hit: &Hit) -> DVec3 {
-        self.pose.ned_from_camera.conjugate() * hit.normal_ned
-    }
-}
-
 impl FrameView<'_> {
-    /// Share of a pixel's area and exposure whose rays meet the same object as the sample at its centre, of
+    /// Fraction of a pixel's area and exposure whose rays meet the same object as the sample at its centre, of
     /// the part of the area that has rays.
     pub(super) fn coverage(&self, pixel: [u32; 2], centre: &RaySample) -> f64 {
         self.coverage_of(pixel, centre, &[]).0
     }
 
-    /// As [`Self::coverage`], and the share of rays that meet none of the objects in `known`.
+    /// As [`Self::coverage`], and the fraction of rays that meet none of the objects in `known`.
     pub(super) fn coverage_of(&self, [x, y]: [u32; 2], centre: &RaySample, known: &[u32]) -> (f64, f64) {
         let object =
             |hit: Option<Hit>| hit.map_or(0, |hit| self.oracle.sequence.scene.object_of_surface(hit.surface));
@@ -145,15 +138,15 @@ impl FrameView<'_> {
         let shift = shifts(u64::from(y) << 32 | u64::from(x));
         let (mut same, mut unknown, mut all) = (0_u32, 0_u32, 0_u32);
         for i in 0..COVERAGE_RAYS {
-            let [x_share, y_share, phase] =
+            let [x_part, y_part, phase] =
                 [0, 1, 2].map(|k: usize| (shift[k] + f64::from(i) * EVEN_3D[k]).fract() - 0.5);
-            let Some(sample) = self.sample([x, y], DVec2::new(x_share, y_share), phase) else { continue };
+            let Some(sample) = self.sample([x, y], DVec2::new(x_part, y_part), phase) else { continue };
             all += 1;
             let number = object(sample.hit);
             same += u32::from(number == wanted);
             unknown += u32::from(number != wanted && !known.contains(&number));
         }
-        let share = |count: u32| f64::from(count) / f64::from(all.max(1));
-        (share(same), share(unknown))
+        let fraction = |count: u32| f64::from(count) / f64::from(all.max(1));
+        (fraction(same), fraction(unknown))
     }
 }

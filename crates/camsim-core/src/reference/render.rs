@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{FrameView, Oracle, RaySample, lamps::RowLamps};
 use crate::{
-    frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
+    frame::{COORDS_CHANNELS, Plane, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
     photometric::{GrayImage, Photometry, photometric},
     pose::CameraPose,
@@ -158,16 +158,20 @@ impl Oracle {
             sum_of_squares += row.sum_of_squares;
         }
         convergence.rms_error_dn = (sum_of_squares / convergence.pixels.max(1) as f64).sqrt();
+        let color = rows.iter().flat_map(|row| row.color.as_flattened()).copied().collect();
+        let mut planes = vec![Plane::color(color)];
+        planes
+            .extend(depth.then(|| Plane::depth(rows.iter().flat_map(|row| &row.depth_m).copied().collect())));
+        planes.extend(
+            coords.then(|| Plane::coords(rows.iter().flat_map(|row| &row.coords).copied().collect())),
+        );
+        planes.extend(self.planes(frame, options));
         let mut rendered = RenderedFrame {
             index: frame,
             stamp_ns: self.sequence.stamp_ns(frame),
             size_px,
-            color_rgba: rows.iter().flat_map(|row| row.color.as_flattened()).copied().collect(),
-            depth_m: depth.then(|| rows.iter().flat_map(|row| &row.depth_m).copied().collect()),
-            coords: coords.then(|| rows.iter().flat_map(|row| &row.coords).copied().collect()),
             rows: self.row_records(frame),
-            planes: self.planes(frame, options),
-            raw: None,
+            planes,
         };
         if options.photometric && !(self.optics.is_some() && options.only.is_some()) {
             self.expose(&mut rendered);

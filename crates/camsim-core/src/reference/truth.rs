@@ -7,11 +7,11 @@ use serde::Serialize;
 use super::{FrameView, Oracle, RaySample};
 use crate::frame::RenderedFrame;
 
-/// Share of the depth beyond which a depth or a point is wrong.
+/// Fraction of the depth beyond which a depth or a point is wrong.
 pub const DEPTH_TOLERANCE: f64 = 1e-3;
 /// Number of directions in which the surroundings of a pixel are sampled.
 const DIRECTIONS: u32 = 16;
-/// Distances of those samples, as shares of the largest.
+/// Distances of those samples, as fractions of the largest.
 const RINGS: [f64; 3] = [0.3, 0.65, 1.0];
 
 /// Errors of a frame's depths and points against the oracle, relative to the depth.
@@ -64,21 +64,21 @@ pub fn truth_errors(
     frame: &RenderedFrame,
     near_px: f64,
 ) -> Option<TruthErrors> {
-    let depth_m = frame.depth_m.as_ref()?;
+    let (depth_m, color_rgba, coords) = (frame.depth_m()?, frame.color_rgba(), frame.coords());
     let width = frame.size_px[0];
     let pixels = width as usize * frame.size_px[1] as usize;
     if frame.size_px != oracle.sequence.scenario.camera.size_px
         || depth_m.len() != pixels
-        || frame.color_rgba.len() != 4 * pixels
+        || color_rgba.len() != 4 * pixels
     {
         return None;
     }
     let view = oracle.view(number);
     let error_of = |i: usize| {
         let pixel = [i as u32 % width, i as u32 / width];
-        let sample = view.sample(pixel, DVec2::ZERO, 0.0).filter(|_| frame.color_rgba[4 * i + 3] > 0.0)?;
+        let sample = view.sample(pixel, DVec2::ZERO, 0.0).filter(|_| color_rgba[4 * i + 3] > 0.0)?;
         let depth_m = f64::from(depth_m[i]);
-        let point = frame.coords.as_ref().filter(|_| depth_m > 0.0).map(|coords| {
+        let point = coords.filter(|_| depth_m > 0.0).map(|coords| {
             let [.., n, e, d] = coords[i];
             DVec3::new(n.into(), e.into(), d.into())
         });

@@ -5,8 +5,7 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     reference::{
         CoordErrors, Disocclusion, ImageErrors, Oracle, RenderOptions, coord_errors, coverage_errors,
-        disocclusion, flow_errors, image_errors, is_compared, is_flow, plane_errors, silhouettes,
-        truth_errors,
+        disocclusion, flow_errors, image_errors, plane_errors, silhouettes, truth_errors,
     },
     scenario::{Channel, Face},
     sequence::Sequence,
@@ -124,10 +123,8 @@ impl<'e> Measuring<'e> {
     /// coordinates beside them are those of rays, and would hide the errors of the sources.
     fn with_channels(&mut self, mut report: FrameReport) -> Result<FrameReport, VerifyError> {
         let sequence = self.session.scene_planner().sequence().clone();
-        let is_measured =
-            |channel: &Channel| is_compared(*channel) || is_flow(*channel) || *channel == Channel::Coverage;
-        let asked: Vec<Channel> =
-            sequence.scenario.output.channels.iter().copied().filter(is_measured).collect();
+        let channels = sequence.scenario.output.channels.iter().copied();
+        let asked: Vec<Channel> = channels.filter(|channel| channel.needs_every_ray()).collect();
         if asked.is_empty() {
             return Ok(report);
         }

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     reference::{CoverageErrors, ErrorStats, ErrorVerdict, FlowErrors, PlaneErrors, TruthErrors},
-    scenario::Channel,
+    scenario::{Channel, Check},
 };
 use camsim_plan::{LevelOfDetail, Predicted};
 use serde::Serialize;
@@ -155,10 +155,10 @@ pub struct PlaneReport {
 
 impl From<PlaneErrors> for PlaneReport {
     fn from(errors: PlaneErrors) -> Self {
-        let is_normal = matches!(errors.channel, Channel::Normal | Channel::NormalWorld);
-        let has_size = is_normal || errors.channel == Channel::Range;
-        let size = |error: f64| {
-            (has_size && error.is_finite()).then_some(if is_normal { error.to_degrees() } else { error })
+        let size = |error: f64| match errors.channel.facts().check {
+            Check::Exact => None,
+            Check::Direction => error.is_finite().then(|| error.to_degrees()),
+            _ => error.is_finite().then_some(error),
         };
         Self {
             channel: errors.channel,

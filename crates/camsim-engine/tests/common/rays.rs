@@ -145,7 +145,7 @@ pub fn assert_silhouettes_of_twin(sequence: &Sequence, done: &Finished) {
     for (i, _) in expected(sequence, plan) {
         let pixel = [i as u32 % width, i as u32 / width];
         with_keys_of_pixel(sequence, plan, &frames, nearest_w, pixel, |uv, d_uv, keys| {
-            errors.add((uv, d_uv), keys, samples, plan, done.frame.color_rgba[4 * i]);
+            errors.add((uv, d_uv), keys, samples, plan, done.frame.color_rgba()[4 * i]);
         });
     }
     let (mean, SilhouetteErrors { compared, differing, .. }) = (errors.mean(), errors);
@@ -181,7 +181,7 @@ fn sample_ideal(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, positio
 /// PSNR of a frame at these pixels, linear values, full scale 1.
 pub fn linear_psnr(frame: &RenderedFrame, expected: &[(usize, DVec3)]) -> f64 {
     let error2 = |&(i, expected): &(usize, DVec3)| {
-        let found = DVec3::from_array([0, 1, 2].map(|c: usize| f64::from(frame.color_rgba[4 * i + c])));
+        let found = DVec3::from_array([0, 1, 2].map(|c: usize| f64::from(frame.color_rgba()[4 * i + c])));
         (found - expected).length_squared() / 3.0
     };
     -10.0 * (expected.iter().map(error2).sum::<f64>() / expected.len() as f64).log10()

@@ -89,7 +89,7 @@ fn expect_hills(who: &str, engine: &Engine, scene: Scene) {
     let near = near_borders(&oracle);
     let truth = reference(&sequence);
     let done = render(engine, &sequence, &[Channel::Color], 0);
-    let [borders_db, others_db] = psnr_db(&truth, &done.frame.color_rgba, &near);
+    let [borders_db, others_db] = psnr_db(&truth, done.frame.color_rgba(), &near);
     let share = near.iter().filter(|&&near| near).count() as f64 / near.len() as f64;
     eprintln!(
         "{who}: {borders_db:.1} dB within 3 px of borders ({share:.2} of the picture), {others_db:.1} dB elsewhere; {} px, {} samples",
@@ -124,7 +124,7 @@ fn without_shadows_pictures_keep_their_bytes() {
         let scene = Scene { terrain: Some(level_ground(&light)), light: Some(light), ..Scene::default() };
         let sequence =
             sequence(looking_down([64, 48], 90.0), steady(40.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
-        (render(&Engine::cpu(), &sequence, &[Channel::Color], 0).frame.color_rgba, reference(&sequence))
+        (render(&Engine::cpu(), &sequence, &[Channel::Color], 0).frame.into_color(), reference(&sequence))
     };
     assert_eq!(flat(true), flat(false));
     let house = |shadows: bool| {
@@ -132,7 +132,7 @@ fn without_shadows_pictures_keep_their_bytes() {
         let done = render(&Engine::cpu(), &sequence, &[Channel::Color], 0);
         assert_eq!(done.plan.shadows.is_some(), shadows);
         assert_eq!(done.plan.skipped.iter().any(|skip| skip.what == "shadows"), !shadows);
-        done.frame.color_rgba
+        done.frame.into_color()
     };
     let differ = house(true).iter().zip(&house(false)).filter(|(a, b)| a != b).count();
     assert!(differ > 3 * 240 * 180 / 10, "{differ}");

@@ -51,7 +51,7 @@ fn expect_passing(who: &str, engine: &Engine) {
     let changed: Vec<bool> =
         truth.chunks_exact(4).zip(bare.chunks_exact(4)).map(|(a, b)| (a[0] - b[0]).abs() > 0.02).collect();
     let count = changed.iter().filter(|&&changed| changed).count();
-    let found = render(engine, &with, &[Channel::Color], 0).frame.color_rgba;
+    let found = render(engine, &with, &[Channel::Color], 0).frame.into_color();
     let [changed_db, others_db] = psnr_db(&truth, &found, &changed);
     eprintln!(
         "{who}: {changed_db:.1} dB in {count} px that it or its shadow changes, {others_db:.1} dB elsewhere"

@@ -174,7 +174,7 @@ fn reference_pictures_the_sundial() {
 
 #[test]
 fn cpu_pictures_the_sundial() {
-    let picture = render(&Engine::cpu(), &sundial(), &[Channel::Color], 0).frame.color_rgba;
+    let picture = render(&Engine::cpu(), &sundial(), &[Channel::Color], 0).frame.into_color();
     expect_sundial("cpu", &picture, 38.0);
 }
 
@@ -183,6 +183,6 @@ fn cpu_pictures_the_sundial() {
 fn gpu_pictures_the_sundial() {
     let mut engine = engine();
     engine.set_backend(Backend::Gpu);
-    let picture = render(&engine, &sundial(), &[Channel::Color], 0).frame.color_rgba;
+    let picture = render(&engine, &sundial(), &[Channel::Color], 0).frame.into_color();
     expect_sundial("gpu", &picture, 38.0);
 }

@@ -132,7 +132,7 @@ impl Engines {
         let frame = FrameOutput {
             color_alone: (case.output == Output::FrameAndColorAlone
                 && implementation == Implementation::CpuVectorised)
-                .then(|| color(&case.sequence).color_rgba),
+                .then(|| color(&case.sequence).into_color()),
             photometric: case.plain.as_ref().map(|plain| with_effects(case, &color(plain))),
             ..frame_output(&done.frame, &done.plan)
         };
@@ -146,7 +146,7 @@ fn with_effects(case: &Case, plain: &RenderedFrame) -> Vec<[f32; 4]> {
     let (stage, seed) = (Photometry::new(&scenario.camera, None), case.sequence.noise_seed());
     let weights = case.sequence.vignette_weights().1;
     let table = tail_table();
-    let pixels = plain.color_rgba.as_chunks::<4>().0;
+    let pixels = plain.color_rgba().as_chunks::<4>().0;
     let black = weights.iter().filter(|&&weight| weight == 0.0).count();
     assert!(black > 50 && black > pixels.len() / 300, "the vignette has a black part: {black}");
     let width = plain.size_px[0];
@@ -162,8 +162,7 @@ fn with_effects(case: &Case, plain: &RenderedFrame) -> Vec<[f32; 4]> {
 }
 
 fn frame_output(frame: &RenderedFrame, plan: &FramePlan) -> FrameOutput {
-    let (coords, depth_m) =
-        (frame.coords.as_ref().expect("asked for"), frame.depth_m.as_ref().expect("asked for"));
+    let (coords, depth_m) = (frame.coords().expect("asked for"), frame.depth_m().expect("asked for"));
     let pixel = |(i, rgba): (usize, &[f32; 4])| {
         let [u, v, x, y, time_s, north_m, east_m, down_m] = coords[i].map(f64::from);
         let uv = DVec2::new(u, v);
@@ -178,8 +177,8 @@ fn frame_output(frame: &RenderedFrame, plan: &FramePlan) -> FrameOutput {
             is_near_sky: false,
         })
     };
-    let pixels = frame.color_rgba.as_chunks::<4>().0.iter().enumerate().map(pixel).collect();
-    FrameOutput { pixels, color_rgba: frame.color_rgba.clone(), ..FrameOutput::default() }
+    let pixels = frame.color_rgba().as_chunks::<4>().0.iter().enumerate().map(pixel).collect();
+    FrameOutput { pixels, color_rgba: frame.color_rgba().to_vec(), ..FrameOutput::default() }
 }
 
 fn color_of(rgba: &[f32; 4]) -> DVec3 {

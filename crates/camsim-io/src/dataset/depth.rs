@@ -6,6 +6,7 @@ use std::{
     sync::atomic::{AtomicU32, AtomicU64, Ordering},
 };
 
+use camsim_core::scenario::Channel;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use rayon::prelude::*;
 
@@ -36,7 +37,7 @@ pub(super) fn read_planes(path: &Path, names: &[&str]) -> Result<Vec<FloatPlane>
 
 /// Depth of a frame, row by row.
 pub(super) fn read_depth(path: &Path) -> Result<FloatPlane, DatasetError> {
-    let mut planes = read_planes(path, &["Z"])?;
+    let mut planes = read_planes(path, Channel::Depth.components())?;
     planes.pop().ok_or_else(|| DatasetError::Input { path: path.into(), message: "has no Z".to_owned() })
 }
 

@@ -2,7 +2,7 @@
 
 use std::{io::Cursor, path::Path};
 
-use camsim_core::scenario::FlowState;
+use camsim_core::scenario::{Channel, FlowState};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{
@@ -28,7 +28,7 @@ pub(super) struct FlowPlane {
 impl FlowPlane {
     /// Reads a channel of flow.
     pub(super) fn read(path: &Path) -> Result<Self, DatasetError> {
-        let mut planes = read_planes(path, &["dx", "dy", "state"])?.into_iter();
+        let mut planes = read_planes(path, Channel::Flow.components())?.into_iter();
         match (planes.next(), planes.next(), planes.next()) {
             (Some(dx), Some(dy), Some(state)) => {
                 Ok(Self { size_px: dx.size_px, dx: dx.values, dy: dy.values, state: state.values })

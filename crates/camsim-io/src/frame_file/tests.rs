@@ -3,7 +3,10 @@
 use std::fs;
 
 use camsim_core::{
-    frame::RenderedFrame, scenario::OutputEncoding, scene::linear_from_srgb, temporal::displacement::Twist,
+    frame::{Plane, RenderedFrame},
+    scenario::OutputEncoding,
+    scene::linear_from_srgb,
+    temporal::displacement::Twist,
 };
 
 use super::*;
@@ -94,8 +97,7 @@ fn depth_is_read_from_exr_and_packed_bytes() {
     let color_rgba: Vec<f32> = (0..24).map(|i| i as f32 / 8.0).collect();
     let frame = RenderedFrame {
         size_px: [3, 2],
-        color_rgba: color_rgba.clone(),
-        depth_m: Some(depth_m),
+        planes: vec![Plane::color(color_rgba.clone()), Plane::depth(depth_m)],
         ..RenderedFrame::default()
     };
     // The output of `apply` can be read again, with linear values above 1.
@@ -129,8 +131,7 @@ fn impossible_depth_is_refused_and_sky_is_not() {
     let read_depth = |depth_m: [f32; 6]| {
         let frame = RenderedFrame {
             size_px: [3, 2],
-            color_rgba: vec![0.5; 24],
-            depth_m: Some(depth_m.to_vec()),
+            planes: vec![Plane::color(vec![0.5; 24]), Plane::depth(depth_m.to_vec())],
             ..RenderedFrame::default()
         };
         write_picture(&folder.path().join("z.exr"), &frame, OutputEncoding::Srgb8).unwrap();

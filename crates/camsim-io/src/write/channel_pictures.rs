@@ -3,8 +3,8 @@
 use std::f32::consts::TAU;
 
 use camsim_core::{
-    frame::{Plane, PlaneValues, RenderedFrame},
-    scenario::{Channel, FlowState},
+    frame::{PlaneValues, RenderedFrame},
+    scenario::{CHANNELS, Channel, ChannelFacts, Colors, FlowState},
     scene::Encoding,
 };
 
@@ -30,7 +30,7 @@ const TURBO: [[u8; 3]; 17] = [
     [169, 22, 1],
     [122, 4, 3],
 ];
-/// Share of the values below the ends of a scale, and above.
+/// Fraction of the values below the ends of a scale, and above.
 const BEYOND: f32 = 0.01;
 /// Brightness where the target of a flow does not show the point.
 const UNSEEN: f32 = 0.4;
@@ -47,64 +47,59 @@ const UNSEEN: f32 = 0.4;
 /// The sky and pixels without a value are black.
 #[must_use]
 pub fn channel_pictures(frame: &RenderedFrame) -> Vec<(Channel, RenderedFrame)> {
-    let picture = |channel: Channel| {
-        let rgb8 = match channel {
-            Channel::Color => return Some((channel, with_color(frame, frame.color_rgba.clone()))),
-            Channel::Depth => distances(frame.depth_m.as_deref()?),
-            _ => of_plane(frame.planes.iter().find(|plane| plane.channel == channel)?),
+    let picture = |&ChannelFacts { channel, colors, .. }: &ChannelFacts| {
+        let values = frame.values(channel)?;
+        let rgba = match colors {
+            Colors::None => return None,
+            Colors::Picture => frame.color_rgba().to_vec(),
+            colors => linear_rgba(&of_plane(colors, channel.components().len(), values)),
         };
-        let linear = Encoding::Srgb.decode_table();
-        let pixel = |[r, g, b]: [u8; 3]| [linear[r as usize], linear[g as usize], linear[b as usize], 1.0];
-        Some((channel, with_color(frame, rgb8.into_iter().flat_map(pixel).collect())))
+        let picture = RenderedFrame::picture(frame.size_px, rgba);
+        Some((channel, RenderedFrame { index: frame.index, ..picture }))
     };
-    Channel::ALL.iter().copied().filter_map(picture).collect()
+    CHANNELS.iter().filter_map(picture).collect()
 }
 
-fn with_color(frame: &RenderedFrame, color_rgba: Vec<f32>) -> RenderedFrame {
-    RenderedFrame { index: frame.index, size_px: frame.size_px, color_rgba, ..RenderedFrame::default() }
+fn linear_rgba(rgb8: &[[u8; 3]]) -> Vec<f32> {
+    let linear = Encoding::Srgb.decode_table();
+    let pixel = |[r, g, b]: &[u8; 3]| [linear[*r as usize], linear[*g as usize], linear[*b as usize], 1.0];
+    rgb8.iter().flat_map(pixel).collect()
 }
 
-fn of_plane(plane: &Plane) -> Vec<[u8; 3]> {
+/// sRGB of a plane with so many components a pixel.
+fn of_plane(colors: Colors, components: usize, values: &PlaneValues) -> Vec<[u8; 3]> {
     let byte = |value: f32| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
-    let values = match &plane.values {
+    let floats: &[f32] = match values {
         PlaneValues::Index(numbers) => return numbers.iter().map(|&number| palette_rgb8(number)).collect(),
         PlaneValues::Float(values) => values,
+        PlaneValues::Raw(_) => &[],
     };
-    let normal = |signs: [f32; 3]| {
-        let of_pixel = |n: &[f32]| {
-            if n == [0.0; 3] { [0; 3] } else { [0, 1, 2].map(|k: usize| byte(0.5 + 0.5 * signs[k] * n[k])) }
-        };
-        values.chunks_exact(3).map(of_pixel).collect()
-    };
-    match plane.channel {
-        Channel::Range => distances(values),
-        Channel::Normal => normal([1.0, -1.0, -1.0]),
-        Channel::NormalWorld => normal([1.0; 3]),
-        Channel::Motion => displacements(values.chunks_exact(2).map(|v| ([v[0], v[1]], 1.0)).collect()),
-        Channel::BlurPath => {
-            displacements(values.chunks_exact(4).map(|v| ([v[2] - v[0], v[3] - v[1]], 1.0)).collect())
-        }
-        Channel::Flow | Channel::FlowBack | Channel::FlowGlobal => {
-            let of_pixel = |v: &[f32]| {
-                let state = |state: FlowState| v[2] == f32::from(state as u8);
-                let value = match () {
-                    () if state(FlowState::None) => 0.0,
-                    () if state(FlowState::Visible) || state(FlowState::Several) => 1.0,
-                    () => UNSEEN,
-                };
-                ([v[0], v[1]], value)
+    match colors {
+        Colors::Distance => distances(floats),
+        Colors::Direction(signs) => {
+            let of_pixel = |n: &[f32]| match n == [0.0; 3] {
+                true => [0; 3],
+                false => [0, 1, 2].map(|k: usize| byte(0.5 + 0.5 * signs[k] * n[k])),
             };
-            displacements(values.chunks_exact(3).map(of_pixel).collect())
+            floats.chunks_exact(3).map(of_pixel).collect()
         }
-        Channel::Coverage
-        | Channel::Color
-        | Channel::Depth
-        | Channel::Valid
-        | Channel::Rows
-        | Channel::Raw
-        | Channel::Coords
-        | Channel::Object
-        | Channel::Class => values.iter().map(|&value| [byte(value); 3]).collect(),
+        Colors::Displacement => displacements(floats.chunks_exact(components).map(displacement_of).collect()),
+        Colors::None | Colors::Picture | Colors::Palette | Colors::Grey => {
+            floats.iter().map(|&value| [byte(value); 3]).collect()
+        }
+    }
+}
+
+/// The displacement of a pixel, and its brightness: from one end to another, or one with a state.
+fn displacement_of(parts: &[f32]) -> ([f32; 2], f32) {
+    let is = |known: FlowState, state: f32| state == f32::from(known as u8);
+    match *parts {
+        [x0, y0, x1, y1] => ([x1 - x0, y1 - y0], 1.0),
+        [dx, dy, state] if is(FlowState::None, state) => ([dx, dy], 0.0),
+        [dx, dy, state] if is(FlowState::Visible, state) || is(FlowState::Several, state) => ([dx, dy], 1.0),
+        [dx, dy, _] => ([dx, dy], UNSEEN),
+        [x, y] => ([x, y], 1.0),
+        _ => ([0.0; 2], 0.0),
     }
 }
 
@@ -151,10 +146,12 @@ fn turbo(share: f32) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
+    use camsim_core::frame::Plane;
+
     use super::*;
 
     fn srgb(picture: &RenderedFrame) -> Vec<[u8; 3]> {
-        let pixels = picture.color_rgba.chunks_exact(4);
+        let pixels = picture.color_rgba().chunks_exact(4);
         pixels.map(|p| [0, 1, 2].map(|k: usize| super::super::encode::srgb8(p[k]))).collect()
     }
 
@@ -164,9 +161,9 @@ mod tests {
         let flow = vec![2.0, 0.0, 1.0, 0.0, 2.0, 2.0, 0.0, 0.0, 0.0];
         let frame = RenderedFrame {
             size_px: [3, 1],
-            color_rgba: vec![0.25; 12],
-            depth_m: Some(vec![10.0, 0.0, 1000.0]),
             planes: vec![
+                Plane::color(vec![0.25; 12]),
+                Plane::depth(vec![10.0, 0.0, 1000.0]),
                 plane(Channel::Object, PlaneValues::Index(vec![0, 1, 2])),
                 plane(
                     Channel::Normal,

@@ -11,7 +11,7 @@ use std::{
 };
 
 use camsim_core::{
-    frame::{COORDS_CHANNELS, RawPicture, RenderedFrame},
+    frame::{PlaneValues, RawPicture, RenderedFrame},
     scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec, PlaneKind, RawFormat},
 };
 
@@ -32,17 +32,66 @@ pub struct FrameFiles {
 
 /// One of the files of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum OutputFile {
+struct OutputFile {
+    channel: Channel,
+    format: FileFormat,
+}
+
+/// Format of a file, which the kind of its channel decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum FileFormat {
     Color(ImageFormat),
-    Depth,
-    Valid,
-    Coords,
-    Rows,
+    /// The components of a plane of floats.
+    Float(&'static [&'static str]),
+    Index,
+    /// Numbers in colour.
+    Palette,
+    Mask,
     Raw(RawFormat),
-    /// A channel of [`RenderedFrame::planes`].
-    Plane(Channel, PlaneKind),
-    /// A channel of numbers in colour.
-    Palette(Channel),
+    Table,
+}
+
+impl FileFormat {
+    fn ending(self) -> &'static str {
+        match self {
+            Self::Color(format) => format.ending(),
+            Self::Raw(format) => format.ending(),
+            Self::Float(_) => "exr",
+            Self::Index | Self::Palette | Self::Mask => "png",
+            Self::Table => "csv",
+        }
+    }
+}
+
+impl OutputFile {
+    /// The video of a picture, which holds all frames.
+    fn video(self) -> Option<ImageFormat> {
+        match self.format {
+            FileFormat::Color(format) if format.is_video() => Some(format),
+            _ => None,
+        }
+    }
+
+    /// Column of `frames.csv`.
+    fn column(self) -> String {
+        let name = self.channel.name();
+        match self.format {
+            FileFormat::Color(format) => format!("{name}_{}", format.ending()),
+            FileFormat::Palette => format!("{name}_palette"),
+            _ => name.to_owned(),
+        }
+    }
+
+    /// Path below the output folder.
+    fn name(self, index: u64, instant: Option<u32>) -> String {
+        let instant = instant.map_or_else(String::new, |instant| format!("_{instant}"));
+        let (name, ending) = (self.channel.name(), self.format.ending());
+        match self.format {
+            _ if self.video().is_some() => format!("{name}{instant}.{ending}"),
+            FileFormat::Palette => format!("{name}_palette/frame_{index:06}{instant}.{ending}"),
+            _ => format!("{name}/frame_{index:06}{instant}.{ending}"),
+        }
+    }
 }
 
 impl FrameFiles {
@@ -66,13 +115,13 @@ impl FrameFiles {
 
     /// Column of `frames.csv` and path below the folder of each file of frame `index`.
     pub fn names(&self, index: u64) -> Vec<(String, String)> {
-        let name = |file| (column_name(file).to_owned(), file_name(file, index, self.instant));
+        let name = |file: OutputFile| (file.column(), file.name(index, self.instant));
         self.files().into_iter().map(name).collect()
     }
 
     /// Whether one of the files holds all frames, so that they can only be rendered together.
     pub fn has_video(&self) -> bool {
-        self.files().iter().any(|file| matches!(file, OutputFile::Color(format) if format.is_video()))
+        self.files().iter().any(|file| file.video().is_some())
     }
 
     /// Whether all files of frame `index` exist. `--resume` skips such frames, as files are never incomplete.
@@ -86,7 +135,10 @@ impl FrameFiles {
     /// # Errors
     /// A file that cannot be removed.
     pub fn remove(&self, frames: &[u64]) -> Result<(), WriteError> {
-        let videos = ImageFormat::VIDEOS.map(|video| file_name(OutputFile::Color(video), 0, self.instant));
+        let videos = ImageFormat::VIDEOS.map(|video| {
+            let format = FileFormat::Color(video);
+            OutputFile { channel: Channel::Color, format }.name(0, self.instant)
+        });
         let files = frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name);
         for name in files.chain(videos) {
             let path = self.folder.join(name);
@@ -124,12 +176,9 @@ impl FrameFiles {
 
     /// Paths and formats of the videos.
     fn videos(&self) -> impl Iterator<Item = (PathBuf, ImageFormat)> + '_ {
-        self.files().into_iter().filter_map(|file| match file {
-            OutputFile::Color(format) if format.is_video() => {
-                Some((self.folder.join(file_name(file, 0, self.instant)), format))
-            }
-            _ => None,
-        })
+        self.files()
+            .into_iter()
+            .filter_map(|file| Some((self.folder.join(file.name(0, self.instant)), file.video()?)))
     }
 
     fn files(&self) -> Vec<OutputFile> {
@@ -137,85 +186,67 @@ impl FrameFiles {
         if self.output.format.is_empty() {
             return files;
         }
-        for channel in &self.output.channels {
-            let channel_files = match *channel {
-                Channel::Color => {
-                    self.output.format.iter().map(|&format| OutputFile::Color(format)).collect()
-                }
-                Channel::Depth => vec![OutputFile::Depth],
-                Channel::Valid => vec![OutputFile::Valid],
-                Channel::Coords => vec![OutputFile::Coords],
-                Channel::Rows => vec![OutputFile::Rows],
-                Channel::Raw => vec![OutputFile::Raw(self.output.raw_format)],
-                plane => {
-                    let palette = (self.output.palette && plane.plane() == Some(PlaneKind::Index))
-                        .then_some(OutputFile::Palette(plane));
-                    plane
-                        .plane()
-                        .map(|kind| OutputFile::Plane(plane, kind))
-                        .into_iter()
-                        .chain(palette)
-                        .collect()
-                }
-            };
-            // A channel or format that is listed twice gives one file.
-            channel_files.into_iter().for_each(|file| {
+        for &channel in &self.output.channels {
+            for format in self.formats(channel) {
+                let file = OutputFile { channel, format };
+                // A channel or format that is listed twice gives one file.
                 if !files.contains(&file) {
-                    files.push(file)
+                    files.push(file);
                 }
-            });
+            }
         }
         files
     }
 
+    fn formats(&self, channel: Channel) -> Vec<FileFormat> {
+        match channel.kind() {
+            PlaneKind::Color(_) => self.output.format.iter().copied().map(FileFormat::Color).collect(),
+            PlaneKind::Float(names) => vec![FileFormat::Float(names)],
+            PlaneKind::Index if self.output.palette => vec![FileFormat::Index, FileFormat::Palette],
+            PlaneKind::Index => vec![FileFormat::Index],
+            PlaneKind::Mask => vec![FileFormat::Mask],
+            PlaneKind::Raw => vec![FileFormat::Raw(self.output.raw_format)],
+            PlaneKind::Table => vec![FileFormat::Table],
+        }
+    }
+
     fn write(&self, frame: &RenderedFrame) -> Result<u64, WriteError> {
-        let files = self.files();
-        check_sizes(frame, &files)?;
         let mut written = 0;
-        for file in files {
-            let path = self.folder.join(file_name(file, frame.index, self.instant));
-            let exr = |names: &[&str], samples: &[f32], pixel| {
-                exr_file::encode(&path, frame.size_px, names, samples, pixel, self.output.exr_compression)
-            };
-            let bytes = match file {
-                OutputFile::Color(ImageFormat::Exr) => {
-                    exr(&["R", "G", "B", "A"], &frame.color_rgba, self.output.exr_pixel)?
-                }
-                OutputFile::Color(ImageFormat::Png) => png_file::encode_color(&path, frame, self.encoding)?,
-                // Videos get their frames in order, from `FrameWriter::write`.
-                OutputFile::Color(ImageFormat::Mp4 | ImageFormat::Mkv | ImageFormat::Y4m) => continue,
-                OutputFile::Depth => {
-                    exr(&["Z"], frame.depth_m.as_deref().unwrap_or_default(), ExrPixel::Float)?
-                }
-                OutputFile::Valid => png_file::encode_valid(&path, frame)?,
-                OutputFile::Coords => {
-                    let samples = frame.coords.as_deref().unwrap_or_default().as_flattened();
-                    exr(&["u", "v", "x", "y", "dt", "n", "e", "d"], samples, ExrPixel::Float)?
-                }
-                OutputFile::Rows => tables::rows_csv(&frame.rows).into_bytes(),
-                OutputFile::Raw(format) => {
-                    let nothing = RawPicture::default();
-                    let raw = frame.raw.as_ref().unwrap_or(&nothing);
-                    raw_picture::encode(&path, frame.size_px, raw, format, self.output.exr_compression)?
-                }
-                OutputFile::Plane(channel, PlaneKind::Float(names)) => {
-                    exr(names, frame.floats(channel).unwrap_or_default(), ExrPixel::Float)?
-                }
-                OutputFile::Plane(channel, PlaneKind::Index) => png_file::encode_indices(
-                    &path,
-                    frame.size_px,
-                    frame.indices(channel).unwrap_or_default(),
-                )?,
-                OutputFile::Palette(channel) => png_file::encode_palette(
-                    &path,
-                    frame.size_px,
-                    frame.indices(channel).unwrap_or_default(),
-                )?,
-            };
+        let files = self.files();
+        files.iter().try_for_each(|file| check_size(frame, file.channel))?;
+        // Videos get their frames in order, from `FrameWriter::write`.
+        for file in files.into_iter().filter(|file| file.video().is_none()) {
+            let path = self.folder.join(file.name(frame.index, self.instant));
+            let bytes = self.encoded(frame, file, &path)?;
             write_atomic(&path, &bytes)?;
             written += bytes.len() as u64;
         }
         Ok(written)
+    }
+
+    /// Bytes of a file; `path` is for messages.
+    fn encoded(&self, frame: &RenderedFrame, file: OutputFile, path: &Path) -> Result<Vec<u8>, WriteError> {
+        let (size_px, compression) = (frame.size_px, self.output.exr_compression);
+        let floats = || frame.floats(file.channel).unwrap_or_default();
+        let indices = || frame.indices(file.channel).unwrap_or_default();
+        match file.format {
+            FileFormat::Color(ImageFormat::Exr) => {
+                let names = file.channel.components();
+                exr_file::encode(path, size_px, names, floats(), self.output.exr_pixel, compression)
+            }
+            FileFormat::Color(_) => png_file::encode_color(path, frame, self.encoding),
+            FileFormat::Float(names) => {
+                exr_file::encode(path, size_px, names, floats(), ExrPixel::Float, compression)
+            }
+            FileFormat::Index => png_file::encode_indices(path, size_px, indices()),
+            FileFormat::Palette => png_file::encode_palette(path, size_px, indices()),
+            FileFormat::Mask => png_file::encode_valid(path, frame),
+            FileFormat::Raw(format) => {
+                let nothing = RawPicture::default();
+                raw_picture::encode(path, size_px, frame.raw().unwrap_or(&nothing), format, compression)
+            }
+            FileFormat::Table => Ok(tables::rows_csv(&frame.rows).into_bytes()),
+        }
     }
 }
 
@@ -248,76 +279,30 @@ fn is_frame_file(name: &str) -> bool {
     parts.all(|part| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
-/// Column of `frames.csv`.
-fn column_name(file: OutputFile) -> &'static str {
-    match file {
-        OutputFile::Color(ImageFormat::Exr) => "color_exr",
-        OutputFile::Color(ImageFormat::Png) => "color_png",
-        OutputFile::Color(ImageFormat::Mp4) => "color_mp4",
-        OutputFile::Color(ImageFormat::Mkv) => "color_mkv",
-        OutputFile::Color(ImageFormat::Y4m) => "color_y4m",
-        OutputFile::Depth => "depth",
-        OutputFile::Valid => "valid",
-        OutputFile::Coords => "coords",
-        OutputFile::Rows => "rows",
-        OutputFile::Raw(_) => "raw",
-        OutputFile::Plane(channel, _) => channel.name(),
-        OutputFile::Palette(Channel::Class) => "class_palette",
-        OutputFile::Palette(_) => "object_palette",
-    }
-}
-
-/// Path below the output folder.
-fn file_name(file: OutputFile, index: u64, instant: Option<u32>) -> String {
-    let instant = instant.map_or_else(String::new, |instant| format!("_{instant}"));
-    let (folder, ending) = match file {
-        OutputFile::Color(format) if format.is_video() => {
-            return format!("color{instant}.{}", format.ending());
-        }
-        OutputFile::Color(format) => ("color", format.ending()),
-        OutputFile::Depth => ("depth", "exr"),
-        OutputFile::Valid => ("valid", "png"),
-        OutputFile::Coords => ("coords", "exr"),
-        OutputFile::Rows => ("rows", "csv"),
-        OutputFile::Raw(format) => ("raw", format.ending()),
-        OutputFile::Plane(channel, PlaneKind::Float(_)) => (channel.name(), "exr"),
-        OutputFile::Plane(channel, PlaneKind::Index) => (channel.name(), "png"),
-        OutputFile::Palette(_) => (column_name(file), "png"),
-    };
-    format!("{folder}/frame_{index:06}{instant}.{ending}")
-}
-
-/// Checks that all planes have the size of the frame, which the encoders assume.
-fn check_sizes(frame: &RenderedFrame, files: &[OutputFile]) -> Result<(), WriteError> {
+/// Checks that a plane has the size of the frame, which the encoders assume.
+fn check_size(frame: &RenderedFrame, channel: Channel) -> Result<(), WriteError> {
     let pixels = frame.size_px[0] as usize * frame.size_px[1] as usize;
-    let sizes = |file: OutputFile| match file {
-        OutputFile::Color(_) | OutputFile::Valid => ("color", frame.color_rgba.len(), pixels * 4),
-        OutputFile::Depth => ("depth", frame.depth_m.as_ref().map_or(0, Vec::len), pixels),
-        OutputFile::Coords => {
-            ("coords", frame.coords.as_ref().map_or(0, Vec::len) * COORDS_CHANNELS, pixels * COORDS_CHANNELS)
-        }
-        OutputFile::Rows => ("rows", frame.rows.len().min(1), 1),
-        OutputFile::Raw(_) => {
-            let (size, channels) = frame.raw.as_ref().map_or((0, 1), |raw| (raw.values.len(), raw.channels));
-            ("raw", size, pixels * channels as usize)
-        }
-        OutputFile::Plane(channel, PlaneKind::Float(names)) => {
-            (channel.name(), frame.floats(channel).map_or(0, <[f32]>::len), pixels * names.len())
-        }
-        OutputFile::Plane(channel, PlaneKind::Index) | OutputFile::Palette(channel) => {
-            (channel.name(), frame.indices(channel).map_or(0, <[u32]>::len), pixels)
-        }
+    let (channel, a_pixel) = match channel.kind() {
+        PlaneKind::Color(names) | PlaneKind::Float(names) => (channel, names.len()),
+        PlaneKind::Index => (channel, 1),
+        PlaneKind::Mask => (Channel::Color, Channel::Color.components().len()),
+        PlaneKind::Raw => (channel, frame.raw().map_or(1, |raw| raw.channels as usize)),
+        PlaneKind::Table => (channel, 0),
     };
-    for (channel, size, needed) in files.iter().map(|&file| sizes(file)) {
-        if size != needed || pixels == 0 {
-            let message = format!(
-                "{channel} has {size} values where {needed} are needed ({}x{})",
-                frame.size_px[0], frame.size_px[1]
-            );
-            return Err(WriteError::Frame { frame: frame.index, message });
-        }
+    let (size, needed) = match channel.kind() {
+        PlaneKind::Table => (frame.rows.len().min(1), 1),
+        _ => (frame.values(channel).map_or(0, PlaneValues::len), pixels * a_pixel),
+    };
+    if size == needed && pixels > 0 {
+        return Ok(());
     }
-    Ok(())
+    let message = format!(
+        "{} has {size} values where {needed} are needed ({}x{})",
+        channel.name(),
+        frame.size_px[0],
+        frame.size_px[1]
+    );
+    Err(WriteError::Frame { frame: frame.index, message })
 }
 
 /// Totals of a writer.

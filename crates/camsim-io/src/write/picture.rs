@@ -4,7 +4,7 @@ use std::path::Path;
 
 use camsim_core::{
     frame::RenderedFrame,
-    scenario::{ExrCompression, ExrPixel, OutputEncoding},
+    scenario::{Channel, ExrCompression, ExrPixel, OutputEncoding},
 };
 
 use super::{WriteError, exr_file, png_file, write_atomic};
@@ -16,8 +16,8 @@ use super::{WriteError, exr_file, png_file, write_atomic};
 /// The extension is another, a plane does not match the size of the frame, or the file cannot be written.
 pub fn write_picture(path: &Path, frame: &RenderedFrame, output: OutputEncoding) -> Result<(), WriteError> {
     let pixels = frame.size_px[0] as usize * frame.size_px[1] as usize;
-    let depth = frame.depth_m.as_deref().filter(|depth| depth.len() == pixels);
-    if frame.color_rgba.len() != 4 * pixels || (frame.depth_m.is_some() && depth.is_none()) {
+    let (color_rgba, depth) = (frame.color_rgba(), frame.depth_m());
+    if color_rgba.len() != 4 * pixels || depth.is_some_and(|depth| depth.len() != pixels) {
         return Err(WriteError::Frame {
             frame: frame.index,
             message: "its planes do not fill its size".into(),
@@ -29,15 +29,14 @@ pub fn write_picture(path: &Path, frame: &RenderedFrame, output: OutputEncoding)
     };
     let bytes = match (ending.as_str(), depth) {
         ("png", _) => png_file::encode_color(path, frame, output)?,
-        ("exr", None) => exr(&["R", "G", "B", "A"], &frame.color_rgba)?,
+        ("exr", None) => exr(Channel::Color.components(), color_rgba)?,
         ("exr", Some(depth)) => {
-            let samples: Vec<f32> = frame
-                .color_rgba
+            let samples: Vec<f32> = color_rgba
                 .chunks_exact(4)
                 .zip(depth)
                 .flat_map(|(p, z)| [p[0], p[1], p[2], p[3], *z])
                 .collect();
-            exr(&["R", "G", "B", "A", "Z"], &samples)?
+            exr(&[Channel::Color, Channel::Depth].map(Channel::components).concat(), &samples)?
         }
         _ => {
             return Err(WriteError::Encode {

@@ -19,7 +19,7 @@ pub(super) fn encode_color(
     frame: &RenderedFrame,
     output: OutputEncoding,
 ) -> Result<Vec<u8>, WriteError> {
-    let pixels = frame.color_rgba.chunks_exact(4);
+    let pixels = frame.color_rgba().chunks_exact(4);
     let grey = |p: &[f32]| luminance([p[0], p[1], p[2]]);
     let (bytes, kind): (Vec<u8>, _) = match output {
         OutputEncoding::Srgb8 => (
@@ -27,11 +27,11 @@ pub(super) fn encode_color(
             ExtendedColorType::Rgba8,
         ),
         OutputEncoding::Linear8 => {
-            (frame.color_rgba.iter().map(|&v| code8(v)).collect(), ExtendedColorType::Rgba8)
+            (frame.color_rgba().iter().map(|&v| code8(v)).collect(), ExtendedColorType::Rgba8)
         }
         // The encoder expects samples in native byte order.
         OutputEncoding::LinearF32 | OutputEncoding::LinearF16 => (
-            frame.color_rgba.iter().flat_map(|&v| code16(v).to_ne_bytes()).collect(),
+            frame.color_rgba().iter().flat_map(|&v| code16(v).to_ne_bytes()).collect(),
             ExtendedColorType::Rgba16,
         ),
         OutputEncoding::Luma8 => (pixels.map(|p| code8(grey(p))).collect(), ExtendedColorType::L8),
@@ -44,7 +44,8 @@ pub(super) fn encode_color(
 
 /// Encodes validity: 255 where alpha is above 0.
 pub(super) fn encode_valid(path: &Path, frame: &RenderedFrame) -> Result<Vec<u8>, WriteError> {
-    let bytes: Vec<u8> = frame.color_rgba.chunks_exact(4).map(|p| if p[3] > 0.0 { 255 } else { 0 }).collect();
+    let bytes: Vec<u8> =
+        frame.color_rgba().chunks_exact(4).map(|p| if p[3] > 0.0 { 255 } else { 0 }).collect();
     encode(path, frame.size_px, &bytes, ExtendedColorType::L8)
 }
 
@@ -126,9 +127,9 @@ pub fn contact_sheet(
     let sheet = [width * columns, height * (frames.len() as u32).div_ceil(columns)];
     let mut bytes = vec![0_u8; sheet[0] as usize * sheet[1] as usize * 3];
     for (index, frame) in frames.iter().enumerate() {
-        let [source_width, source_height] = frame.size_px;
+        let ([source_width, source_height], color_rgba) = (frame.size_px, frame.color_rgba());
         if frame.size_px != first.size_px
-            || frame.color_rgba.len() != source_width as usize * source_height as usize * 4
+            || color_rgba.len() != source_width as usize * source_height as usize * 4
         {
             return Err(fail(frame.index, "its size is not that of the first frame of the contact sheet"));
         }
@@ -140,7 +141,7 @@ pub fn contact_sheet(
                 for sy in y * shrink..((y + 1) * shrink).min(source_height) {
                     for sx in x * shrink..((x + 1) * shrink).min(source_width) {
                         let first = (sy as usize * source_width as usize + sx as usize) * 4;
-                        sum.iter_mut().zip(&frame.color_rgba[first..]).for_each(|(sum, value)| *sum += value);
+                        sum.iter_mut().zip(&color_rgba[first..]).for_each(|(sum, value)| *sum += value);
                         count += 1.0;
                     }
                 }

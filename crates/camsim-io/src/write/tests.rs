@@ -18,15 +18,16 @@ const SIZE: [u32; 2] = [33, 21];
 
 fn frame(index: u64) -> RenderedFrame {
     let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let light = |i| if i % 4 == 3 { f32::from(u8::from(i % 8 == 3)) } else { (i % 97) as f32 / 96.0 };
     RenderedFrame {
         index,
         stamp_ns: 1_400_000_000_000_000_123,
         size_px: SIZE,
-        color_rgba: (0..pixels * 4)
-            .map(|i| if i % 4 == 3 { f32::from(u8::from(i % 8 == 3)) } else { (i % 97) as f32 / 96.0 })
-            .collect(),
-        depth_m: Some((0..pixels).map(|i| i as f32 * 1.25).collect()),
-        coords: Some((0..pixels).map(|i| std::array::from_fn(|c| (i * 8 + c) as f32 * 0.1)).collect()),
+        planes: vec![
+            Plane::color((0..pixels * 4).map(light).collect()),
+            Plane::depth((0..pixels).map(|i| i as f32 * 1.25).collect()),
+            Plane::coords((0..pixels).map(|i| std::array::from_fn(|c| (i * 8 + c) as f32 * 0.1)).collect()),
+        ],
         rows: vec![RowRecord {
             exposure_ns: 0,
             row: 0,
@@ -35,8 +36,6 @@ fn frame(index: u64) -> RenderedFrame {
             ned_from_camera: DQuat::IDENTITY,
             velocity_ned_m_s: DVec3::X,
         }],
-        planes: Vec::new(),
-        raw: None,
     }
 }
 
@@ -111,20 +110,15 @@ fn all_channels_read_back_in_all_compressions() {
         assert_eq!(color.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["A", "B", "G", "R"]);
         for (name, values) in &color {
             let channel = ["R", "G", "B", "A"].iter().position(|n| n == name).unwrap();
-            for (read, pixel) in values.iter().zip(frame.color_rgba.chunks_exact(4)) {
+            for (read, pixel) in values.iter().zip(frame.color_rgba().chunks_exact(4)) {
                 assert!((read - pixel[channel]).abs() <= tolerance);
             }
         }
         let depth = read_exr(&dir.path().join("depth/frame_000007.exr"));
-        assert_eq!((depth[0].0.as_str(), &depth[0].1), ("Z", frame.depth_m.as_ref().unwrap()));
+        assert_eq!((depth[0].0.as_str(), depth[0].1.as_slice()), ("Z", frame.depth_m().unwrap()));
         for (name, values) in read_exr(&dir.path().join("coords/frame_000007.exr")) {
             let channel = ["u", "v", "x", "y", "dt", "n", "e", "d"].iter().position(|n| *n == name).unwrap();
-            assert!(
-                values
-                    .iter()
-                    .zip(frame.coords.as_ref().unwrap())
-                    .all(|(read, pixel)| *read == pixel[channel])
-            );
+            assert!(values.iter().zip(frame.coords().unwrap()).all(|(read, pixel)| *read == pixel[channel]));
         }
         let rows = fs::read_to_string(dir.path().join("rows/frame_000007.csv")).unwrap();
         assert_eq!(rows, "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd\n0,-5,0.1,2,-3,1,0,0,0,1,0,0\n");
@@ -143,7 +137,7 @@ fn png_has_the_configured_encoding() {
         let bytes = png_file::encode_color(Path::new("x.png"), &frame(0), output).unwrap();
         let read = image::load_from_memory(&bytes).unwrap();
         assert_eq!(read.color(), kind);
-        let expected = &frame(0).color_rgba;
+        let expected = frame(0).into_color();
         let red = |pixel: usize| f64::from(expected[pixel * 4]);
         match read {
             image::DynamicImage::ImageRgba8(read) if output == OutputEncoding::Srgb8 => {
@@ -198,7 +192,7 @@ fn failures_name_the_path_and_leave_no_files() {
     assert_eq!(files_below(dir.path()), ["color"], "the temporary file is gone");
     assert!(write_atomic(Path::new("/"), b"x").unwrap_err().to_string().contains("names no file"));
 
-    let short = RenderedFrame { color_rgba: vec![0.0; 5], ..frame(3) };
+    let short = RenderedFrame { planes: vec![Plane::color(vec![0.0; 5])], ..frame(3) };
     let mut writer =
         FrameWriter::new(FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8), 1);
     let result = writer.write(short);
@@ -209,7 +203,7 @@ fn failures_name_the_path_and_leave_no_files() {
 #[test]
 fn non_finite_values_are_written_without_panic() {
     let mut odd = frame(0);
-    odd.color_rgba[..8].copy_from_slice(&[
+    odd.color_rgba_mut()[..8].copy_from_slice(&[
         f32::NAN,
         f32::INFINITY,
         -1e30,

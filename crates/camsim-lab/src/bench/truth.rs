@@ -115,7 +115,7 @@ impl Truth {
     /// them. A pixel that is invalid in one picture counts in `falsely_valid` or `missing` instead.
     fn squared_errors(&self, frame: &RenderedFrame) -> [(f64, u64); 2] {
         let mut sums = [(0.0, 0); 2];
-        let pairs = self.picture.color_rgba.chunks_exact(4).zip(frame.color_rgba.chunks_exact(4));
+        let pairs = self.picture.color_rgba().chunks_exact(4).zip(frame.color_rgba().chunks_exact(4));
         for ((truth, own), near) in pairs.zip(self.coords.near_silhouettes()) {
             if truth[3] > 0.0 && own[3] > 0.0 {
                 let (sum, count) = &mut sums[usize::from(*near)];

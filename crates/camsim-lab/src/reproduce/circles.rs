@@ -28,7 +28,7 @@ pub fn detect_blobs(frame: &RenderedFrame) -> Vec<Blob> {
     let [width, height] = frame.size_px.map(|side| side as i32);
     let light = |x: i32, y: i32| {
         let index = 4 * (y * width + x) as usize;
-        let [r, g, b, a] = [0, 1, 2, 3].map(|k| frame.color_rgba[index + k]);
+        let [r, g, b, a] = [0, 1, 2, 3].map(|k| frame.color_rgba()[index + k]);
         (a > 0.0).then_some((r + g + b) / 3.0)
     };
     let inside = |x: i32, y: i32| x >= 0 && y >= 0 && x < width && y < height;
@@ -156,7 +156,7 @@ mod tests {
             1.0 - (0..4096).filter(|&k| inside(k)).count() as f32 / 4096.0
         };
         let color_rgba = (0..64 * 48).flat_map(|i| [light(i), light(i), light(i), 1.0]).collect();
-        RenderedFrame { size_px, color_rgba, ..RenderedFrame::default() }
+        RenderedFrame::picture(size_px, color_rgba)
     }
 
     #[test]
@@ -174,7 +174,7 @@ mod tests {
             assert!(shift < 5e-3 && growth.abs() < 5e-3, "{blob:?}: {shift} {growth}");
         }
         // A blob with a pixel without a ray in its rim is left out.
-        frame.color_rgba[4 * (15 * 64 + 27) + 3] = 0.0;
+        frame.color_rgba_mut()[4 * (15 * 64 + 27) + 3] = 0.0;
         assert_eq!(detect_blobs(&frame).len(), 1);
     }
 

@@ -103,19 +103,17 @@ impl PaperIdealFrame {
         let frame = test_bench::render(engine, &Arc::new(wide), &[Channel::Color, Channel::Depth], [0])?
             .pop()
             .map(|finished| finished.frame);
-        let (Some(pose), Some(RenderedFrame { color_rgba, depth_m: Some(depth_m), .. })) =
-            (Some(path.pose(stamp_s)), frame)
-        else {
+        let Some(inverse_depth) = frame.as_ref().and_then(inverse_depth) else {
             return Err(ReproduceError::setup("the ideal frame", "it has no depth"));
         };
+        let pose = path.pose(stamp_s);
         let camera_from_ned = pose.ned_from_camera.inverse();
         let twist = Twist {
             velocity_m_s: camera_from_ned * path.velocity_ned(stamp_s),
             rate_rad_s: path.rate_camera(stamp_s),
         };
-        let inverse_depth =
-            depth_m.iter().map(|&depth_m| if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 }).collect();
-        Ok(Self { geometry, pose, twist, rgba: color_rgba, inverse_depth })
+        let rgba = frame.map(RenderedFrame::into_color).unwrap_or_default();
+        Ok(Self { geometry, pose, twist, rgba, inverse_depth })
     }
 
     /// Source of an output pixel's ray, `dt_s` after the stamp, in this frame.
@@ -158,7 +156,7 @@ impl PaperIdealFrame {
             color.map_or([0.0; 4], |c| [c.x as f32, c.y as f32, c.z as f32, 1.0])
         };
         let color_rgba = (0..width * height).into_par_iter().flat_map_iter(pixel).collect();
-        Ok(RenderedFrame { size_px: camera.size_px, color_rgba, ..RenderedFrame::default() })
+        Ok(RenderedFrame::picture(camera.size_px, color_rgba))
     }
 
     /// As [`Self::frame`], without exposure.
@@ -203,4 +201,9 @@ impl PaperIdealFrame {
 /// Applies a function to each channel.
 fn map_channels(color: DVec3, change: fn(f32) -> f32) -> DVec3 {
     DVec3::from_array(color.to_array().map(|value| f64::from(change(value as f32))))
+}
+/// Inverse depths of a frame; 0 for the sky.
+fn inverse_depth(frame: &RenderedFrame) -> Option<Vec<f32>> {
+    let inverse = |&depth_m: &f32| if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 };
+    Some(frame.depth_m()?.iter().map(inverse).collect())
 }

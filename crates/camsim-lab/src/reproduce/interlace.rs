@@ -19,7 +19,7 @@ pub(super) fn interlace_frames(even: &RenderedFrame, odd: &RenderedFrame) -> Ren
     let mut frame = odd.clone();
     let row = 4 * frame.size_px[0] as usize;
     for (target, source) in
-        frame.color_rgba.chunks_exact_mut(row).zip(even.color_rgba.chunks_exact(row)).step_by(2)
+        frame.color_rgba_mut().chunks_exact_mut(row).zip(even.color_rgba().chunks_exact(row)).step_by(2)
     {
         target.copy_from_slice(source);
     }

@@ -310,7 +310,7 @@ pub(super) fn paper_roots(camera: &CameraModel) -> Vec<(bool, RootKind)> {
 /// The frame with the invalid pixels of the paper's lens inverse, and false roots in blue.
 fn with_paper_roots(frame: &RenderedFrame, camera: &CameraModel) -> RenderedFrame {
     let mut frame = frame.clone();
-    for (pixel, (converges, kind)) in frame.color_rgba.chunks_exact_mut(4).zip(paper_roots(camera)) {
+    for (pixel, (converges, kind)) in frame.color_rgba_mut().chunks_exact_mut(4).zip(paper_roots(camera)) {
         match (converges, kind) {
             (_, RootKind::False) => pixel.copy_from_slice(&[0.0, 0.0, 1.0, 1.0]),
             (false, _) => pixel[3] = 0.0,

@@ -90,7 +90,7 @@ impl ExperimentReport {
 /// The frame with invalid pixels in red, as in the paper.
 fn with_red_invalid_pixels(frame: &RenderedFrame) -> RenderedFrame {
     let mut frame = frame.clone();
-    for pixel in frame.color_rgba.chunks_exact_mut(4).filter(|pixel| pixel[3] <= 0.0) {
+    for pixel in frame.color_rgba_mut().chunks_exact_mut(4).filter(|pixel| pixel[3] <= 0.0) {
         pixel.copy_from_slice(&[1.0, 0.0, 0.0, 1.0]);
     }
     frame

@@ -234,12 +234,12 @@ pub fn mean<'a>(frames: impl IntoIterator<Item = &'a RenderedFrame>) -> Rendered
     let mut count = 1.0_f32;
     for frame in frames {
         count += 1.0;
-        for (sum, value) in sum.color_rgba.chunks_exact_mut(4).zip(frame.color_rgba.chunks_exact(4)) {
+        for (sum, value) in sum.color_rgba_mut().chunks_exact_mut(4).zip(frame.color_rgba().chunks_exact(4)) {
             (0..3).for_each(|k| sum[k] += value[k]);
             sum[3] = sum[3].min(value[3]);
         }
     }
-    sum.color_rgba.chunks_exact_mut(4).for_each(|pixel| (0..3).for_each(|k| pixel[k] /= count));
+    sum.color_rgba_mut().chunks_exact_mut(4).for_each(|pixel| (0..3).for_each(|k| pixel[k] /= count));
     sum
 }
 
@@ -249,7 +249,7 @@ pub fn mean<'a>(frames: impl IntoIterator<Item = &'a RenderedFrame>) -> Rendered
 /// The frames have different sizes.
 pub fn difference(a: &RenderedFrame, b: &RenderedFrame) -> Result<Comparison, ReproduceError> {
     fn view(frame: &RenderedFrame) -> ImageView<'_> {
-        ImageView { size_px: frame.size_px, channels: 4, alpha: Some(3), samples: &frame.color_rgba }
+        ImageView { size_px: frame.size_px, channels: 4, alpha: Some(3), samples: frame.color_rgba() }
     }
     compare(view(a), view(b)).map_err(|error| ReproduceError::setup("the pair of pictures", error))
 }
@@ -273,7 +273,7 @@ pub fn count_wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> R
     // The sky is blue, the target grey. A border pixel with similar shares of both is right either way.
     let sky_share = |pixel: &[f32]| (pixel[2] - pixel[0]) / (SKY_LINEAR[2] - SKY_LINEAR[0]);
     let view = reference.view(0);
-    let wrong = frame.color_rgba.par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
+    let wrong = frame.color_rgba().par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
         let position = [*i as u32 % width, *i as u32 / width];
         let sample = view.sample(position, DVec2::ZERO, 0.0);
         sample.is_some_and(|sample| {

@@ -159,7 +159,7 @@ fn interlacing_and_blur_match_perfect_frames() {
         // The ideal frame contains the corners of both fields, despite the rotation between them.
         let own = &fields.pictures[0].frames[4];
         assert!(
-            own.color_rgba.chunks_exact(4).all(|pixel| pixel[3] > 0.0),
+            own.color_rgba().chunks_exact(4).all(|pixel| pixel[3] > 0.0),
             "a pixel of a pinhole camera has no source"
         );
         eprintln!("{}", fields.tables[0].1.text());

@@ -119,15 +119,15 @@ pub fn add(frame: &RenderedFrame, of: &str, checksums: &mut Checksums, faults: &
         let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
         checksums.insert(format!("{of} {channel}"), Kept { checksum, mean });
     };
-    let valid: Vec<f32> = frame.color_rgba.iter().skip(3).step_by(4).copied().collect();
-    add("color", &frame.color_rgba);
+    let valid: Vec<f32> = frame.color_rgba().iter().skip(3).step_by(4).copied().collect();
+    add("color", frame.color_rgba());
     add("valid", &valid);
-    frame.depth_m.iter().for_each(|depth_m| add("depth", depth_m));
-    frame.coords.iter().for_each(|coords| add("coords", coords.as_flattened()));
+    frame.depth_m().iter().for_each(|depth_m| add("depth", depth_m));
+    frame.coords().iter().for_each(|coords| add("coords", coords.as_flattened()));
     if !valid.iter().all(|&valid| valid == 0.0 || valid == 1.0) {
         faults.push(format!("{of} valid: neither 0 nor 1"));
     }
-    if frame.depth_m.iter().flatten().any(|&depth_m| depth_m < 0.0) {
+    if frame.depth_m().into_iter().flatten().any(|&depth_m| depth_m < 0.0) {
         faults.push(format!("{of} depth: below 0"));
     }
 }
@@ -140,7 +140,7 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
 /// RMS difference of the colours of two frames over the pixels that are valid in both, 1/255; and the number
 /// of pixels that are valid in one alone: the lens inverses round otherwise where the lens folds its image.
 pub fn apart_dn(a: &RenderedFrame, b: &RenderedFrame) -> (f64, usize) {
-    let pixels = a.color_rgba.chunks_exact(4).zip(b.color_rgba.chunks_exact(4));
+    let pixels = a.color_rgba().chunks_exact(4).zip(b.color_rgba().chunks_exact(4));
     let (valid, other): (Vec<_>, Vec<_>) = pixels.partition(|(a, b)| a[3] == b[3]);
     let squares = valid.iter().flat_map(|(a, b)| a.iter().zip(*b)).map(|(a, b)| f64::from(a - b).powi(2));
     (255.0 * (squares.sum::<f64>() / (4 * valid.len()).max(1) as f64).sqrt(), other.len())

@@ -59,7 +59,7 @@ fn errors_dn(oracle: &Oracle, truth: &[DVec3], samples: u32) -> (f64, f64) {
     let (frame, convergence) = oracle.render_reported(0, &options);
     assert_eq!(convergence.samples, u64::from(samples) * truth.len() as u64);
     let squares = frame
-        .color_rgba
+        .color_rgba()
         .chunks_exact(4)
         .zip(truth)
         .map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
@@ -117,7 +117,7 @@ fn pixels_are_refined_until_the_tolerance_is_kept() {
             RenderOptions { tolerance_dn, max_samples: 8192, photometric: false, ..RenderOptions::default() };
         let (frame, convergence) = oracle.render_reported(0, &options);
         let squares = frame
-            .color_rgba
+            .color_rgba()
             .chunks_exact(4)
             .zip(truth)
             .map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
@@ -131,6 +131,6 @@ fn pixels_are_refined_until_the_tolerance_is_kept() {
             rms_dn < tolerance_dn && convergence.rms_error_dn < tolerance_dn && convergence.unfinished == 0,
             "{rms_dn} {convergence:?}"
         );
-        assert_eq!(frame.color_rgba, oracle.render(0, &options).color_rgba, "a frame has one value only");
+        assert_eq!(frame.color_rgba(), oracle.render(0, &options).color_rgba(), "a frame has one value only");
     }
 }

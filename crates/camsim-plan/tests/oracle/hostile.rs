@@ -127,10 +127,10 @@ fn any_instant_has_an_answer() {
         };
         for frame in [0, u64::MAX] {
             let rendered = oracle.render(frame, &options);
-            assert_eq!(rendered.color_rgba.len(), 4 * 16 * 12);
-            assert!(rendered.color_rgba.iter().all(|value| value.is_finite()), "{start_s} {frame}");
+            assert_eq!(rendered.color_rgba().len(), 4 * 16 * 12);
+            assert!(rendered.color_rgba().iter().all(|value| value.is_finite()), "{start_s} {frame}");
             assert!(
-                rendered.depth_m.unwrap().iter().all(|depth| depth.is_finite() && *depth >= 0.0),
+                rendered.depth_m().unwrap().iter().all(|depth| depth.is_finite() && *depth >= 0.0),
                 "{start_s} {frame}"
             );
         }
@@ -233,8 +233,8 @@ fn measuring_hides_nothing() {
         oracle.render(0, &RenderOptions { channels: vec![Channel::Coords], key, ..RenderOptions::default() });
     let own = coord_errors(&oracle, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
     assert!(own.all.max_px < 2e-5 && own.all.count == 300, "{own:?}");
-    frame.coords.as_mut().unwrap()[7][2] = f32::NAN;
-    frame.color_rgba[4 * 9 + 3] = 0.0;
+    frame.floats_mut(Channel::Coords).unwrap()[7 * 8 + 2] = f32::NAN;
+    frame.color_rgba_mut()[4 * 9 + 3] = 0.0;
     let broken = coord_errors(&oracle, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
     assert_eq!((broken.all.max_px, broken.missing, broken.all.count), (f64::INFINITY, 1, 299));
     frame.size_px = [15, 20];

@@ -186,7 +186,7 @@ fn errors_of_light_are_what_was_added() {
                 }
             })
             .collect();
-        RenderedFrame { size_px: [20, 10], color_rgba, ..RenderedFrame::default() }
+        RenderedFrame::picture([20, 10], color_rgba)
     };
     let near: Vec<bool> = (0..200).map(|i| i >= 150).collect();
     let errors = image_errors(&frame(0.0), &frame(0.01), &near).unwrap();
@@ -201,7 +201,7 @@ fn errors_of_light_are_what_was_added() {
     assert_eq!(image_errors(&frame(0.0), &frame(0.0), &near).unwrap().all_db, f64::INFINITY);
     // Nothing is farther off than what is not a number.
     let mut broken = frame(0.0);
-    broken.color_rgba[1] = f32::NAN;
+    broken.color_rgba_mut()[1] = f32::NAN;
     assert_eq!(image_errors(&frame(0.0), &broken, &near).unwrap().smooth_db, f64::NEG_INFINITY);
     assert_eq!(image_errors(&frame(0.0), &frame(0.0), &near[1..]), None);
 }

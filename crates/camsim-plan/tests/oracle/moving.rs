@@ -129,7 +129,7 @@ fn the_blur_of_an_edge_is_as_long_as_its_way() {
     let middle_px = 31.5 + speed_px_s * row_s(y);
     let mut in_ramp = 0;
     for x in 0..SIZE_PX[0] {
-        let value = f64::from(frame.color_rgba[(4 * (y * SIZE_PX[0] + x)) as usize]);
+        let value = f64::from(frame.color_rgba()[(4 * (y * SIZE_PX[0] + x)) as usize]);
         let off_px = f64::from(x) - middle_px;
         // Pixels at the ends of the ramp are partly beyond it.
         if (off_px.abs() - 0.5 * length_px).abs() < 0.5 {

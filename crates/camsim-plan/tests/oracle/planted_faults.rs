@@ -3,7 +3,7 @@
 
 use camsim_core::{
     camera::CameraModel,
-    frame::RenderedFrame,
+    frame::{Plane, RenderedFrame},
     reference::{CoordErrors, Oracle, coord_errors},
     scenario::{Channel, Scenario},
     sequence::Sequence,
@@ -64,8 +64,7 @@ fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFram
     RenderedFrame {
         index: plan.frame,
         size_px: camera.size_px,
-        color_rgba,
-        coords: Some(coords),
+        planes: vec![Plane::color(color_rgba), Plane::coords(coords)],
         ..RenderedFrame::default()
     }
 }

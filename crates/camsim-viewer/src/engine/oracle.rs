@@ -81,9 +81,10 @@ fn shown(oracle: &Oracle, partial: &PartialFrame, size_px: [u32; 2]) -> Vec<f32>
     if !oracle.spreads_light() || partial.rows < size_px[1] as usize {
         return color_rgba;
     }
-    let mut whole = RenderedFrame { index: partial.frame, size_px, color_rgba, ..RenderedFrame::default() };
+    let picture = RenderedFrame::picture(size_px, color_rgba);
+    let mut whole = RenderedFrame { index: partial.frame, ..picture };
     oracle.expose(&mut whole);
-    whole.color_rgba
+    whole.into_color()
 }
 
 /// Renders the missing rows from the top, until a newer request arrives.
@@ -103,7 +104,7 @@ fn render_rows(
         let difference = request.against.as_ref().filter(|_| is_comparable).and_then(|(picture, gain)| {
             let against = &picture.frame;
             (against.size_px == size_px)
-                .then(|| difference(size_px, &against.color_rgba, &color_rgba, *gain, partial.rows as u32))
+                .then(|| difference(size_px, against.color_rgba(), &color_rgba, *gain, partial.rows as u32))
                 .flatten()
         });
         replies.send(Reply::OraclePicture(Box::new(OraclePicture {
@@ -132,7 +133,7 @@ fn render_rows(
         let strip = oracle.render(partial.frame, &options);
         let range = 4 * width * rows.start..4 * width * rows.end;
         if let (Some(to), Some(from)) =
-            (partial.color_rgba.get_mut(range.clone()), strip.color_rgba.get(range))
+            (partial.color_rgba.get_mut(range.clone()), strip.color_rgba().get(range))
         {
             to.copy_from_slice(from);
         }

@@ -158,7 +158,8 @@ impl<'a> Worker<'a> {
         let difference = match (request.gain, pictures.as_slice()) {
             (Some(gain), [a, b]) => {
                 let size_px = a.frame.size_px;
-                difference(size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain, size_px[1]).map(Arc::new)
+                difference(size_px, a.frame.color_rgba(), b.frame.color_rgba(), gain, size_px[1])
+                    .map(Arc::new)
             }
             _ => None,
         };
@@ -215,7 +216,7 @@ impl<'a> Worker<'a> {
         }
         let finished = self.render(&variant(sequence, stage, size)?, &[Channel::Color], frame)?;
         let Finished { frame, plan, times, .. } = finished;
-        let image = Arc::new(srgb_image(frame.size_px, &frame.color_rgba));
+        let image = Arc::new(srgb_image(frame.size_px, frame.color_rgba()));
         let picture = Arc::new(Picture { stage, frame, plan, times, image });
         if self.cache.len() >= CACHE_SIZE {
             self.cache.remove(0);
@@ -239,9 +240,10 @@ impl<'a> Worker<'a> {
     ) -> Result<DepthPicture, Fault> {
         let finished =
             self.render(&variant(sequence, stage, size)?, &[Channel::Color, Channel::Depth], frame)?;
-        let depth_m = finished.frame.depth_m.unwrap_or_default();
+        let size_px = finished.frame.size_px;
+        let depth_m = finished.frame.into_floats(Channel::Depth).unwrap_or_default();
         let range_m = depth_range_m(&depth_m);
-        let image = Arc::new(depth_image(finished.frame.size_px, &depth_m, range_m));
+        let image = Arc::new(depth_image(size_px, &depth_m, range_m));
         Ok(DepthPicture { depth_m, range_m, image })
     }
 

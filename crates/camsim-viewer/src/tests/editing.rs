@@ -14,7 +14,7 @@ use crate::{engine::Size, message::Message};
 fn an_edit_renders_a_new_frame_and_undo_restores_the_old_one() {
     let mut window = Window::open(Some(demo()));
     window.settle();
-    let before = window.state().engine.picture().expect("a picture").frame.color_rgba.clone();
+    let before = window.state().engine.picture().expect("a picture").frame.color_rgba().to_vec();
     let key = "camera.shutter.exposure_ms";
     window.harness.get_by_label(key).set_value_accesskit(30.0);
     window.step();
@@ -26,13 +26,13 @@ fn an_edit_renders_a_new_frame_and_undo_restores_the_old_one() {
     });
     window.settle();
     let after = window.state().engine.picture().expect("a picture");
-    assert_ne!(after.frame.color_rgba, before);
+    assert_ne!(after.frame.color_rgba(), before);
     assert!(after.plan.motion.blur_px > 2.0, "{}", after.plan.motion.blur_px);
     window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     window.step();
     window.settle();
     assert_eq!(
-        window.state().engine.picture().expect("a picture").frame.color_rgba,
+        window.state().engine.picture().expect("a picture").frame.color_rgba(),
         before,
         "undone to the last bit"
     );

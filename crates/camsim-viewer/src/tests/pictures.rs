@@ -123,7 +123,7 @@ fn stages_are_compared_by_wipe_difference_and_side_by_side() {
     assert_eq!(window.state().view.stages(), [Stage::Photometric, Stage::Lens]);
     let pair = &window.state().engine.shown.as_ref().expect("shown").reply.pictures;
     assert_eq!(pair.len(), 2);
-    assert_ne!(pair[0].frame.color_rgba, pair[1].frame.color_rgba);
+    assert_ne!(pair[0].frame.color_rgba(), pair[1].frame.color_rgba());
     // Only A has noise and vignette.
     assert!(pair[1].plan.skipped.iter().any(|skip| skip.what == "noise"));
     assert!(!pair[0].plan.skipped.iter().any(|skip| skip.what == "noise"));

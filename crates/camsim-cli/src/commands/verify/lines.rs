@@ -2,10 +2,10 @@
 
 use camsim_core::{
     reference::{
-        CoverageErrors, DEPTH_TOLERANCE, FLOW_TOLERANCE_PX, FlowErrors, FlowStats, NORMAL_TOLERANCE_RAD,
-        TruthErrors,
+        CoverageErrors, DEPTH_TOLERANCE, FLOW_TOLERANCE_PX, FlowErrors, FlowStats, MOTION_TOLERANCE,
+        NORMAL_TOLERANCE_RAD, TruthErrors,
     },
-    scenario::Channel,
+    scenario::{ChannelFacts, Check},
 };
 use camsim_engine::verify::{FlowReport, FrameReport, Kept, PlaneReport};
 
@@ -42,16 +42,17 @@ fn share(part: u64, of: u64) -> f64 {
 
 fn describe_plane(plane: &PlaneReport) -> String {
     let PlaneReport { channel, kept, pixels, pixels_away, beyond, beyond_away, faults, max, .. } = plane;
-    let largest = match (channel, max) {
-        (Channel::Object | Channel::Class, _) => String::new(),
+    let check = channel.facts().check;
+    let largest = match (check, max) {
+        (Check::Exact, _) => String::new(),
         (_, None) => " (largest error: sky instead of surface)".to_owned(),
-        (Channel::Range, Some(max)) => format!(" (largest error {:.3} %)", 100.0 * max),
-        (_, Some(max)) => format!(" (largest error {max:.3} deg)"),
+        (Check::Direction, Some(max)) => format!(" (largest error {max:.3} deg)"),
+        (_, Some(max)) => format!(" (largest error {:.3} %)", 100.0 * max),
     };
-    let allowed = match channel {
-        Channel::Object | Channel::Class => "wrong".to_owned(),
-        Channel::Range => format!("off by more than {} %", 100.0 * DEPTH_TOLERANCE),
-        _ => format!("off by more than {:.1} deg", NORMAL_TOLERANCE_RAD.to_degrees()),
+    let allowed = match check {
+        Check::Exact => "wrong".to_owned(),
+        Check::Direction => format!("off by more than {:.1} deg", NORMAL_TOLERANCE_RAD.to_degrees()),
+        _ => format!("off by more than {} %", 100.0 * DEPTH_TOLERANCE),
     };
     format!(
         "{} {allowed}: {beyond} of {pixels} pixels{largest}; {beyond_away} of {pixels_away} away from \
@@ -69,9 +70,13 @@ fn describe_plane(plane: &PlaneReport) -> String {
 fn describe_flow(FlowReport { channel, kept, errors }: &FlowReport) -> Vec<String> {
     let FlowErrors { of_pixels, away, near, states, beyond, faults, .. } = errors;
     let name = channel.name();
-    let (unit, allowed) = match channel {
-        Channel::Motion => ("px/s", "0.1 % and 0.05 px/s".to_owned()),
-        _ => ("px", format!("{FLOW_TOLERANCE_PX} px")),
+    let ChannelFacts { unit, check, .. } = channel.facts();
+    let allowed = match check {
+        Check::Velocity => {
+            let (fraction, px_s) = MOTION_TOLERANCE;
+            format!("{} % and {px_s} px/s", 100.0 * fraction)
+        }
+        _ => format!("{FLOW_TOLERANCE_PX} px"),
     };
     let figures = |of: &FlowStats| {
         format!("p50 {}, p99 {}, max {} {unit}", figure(of.p50), figure(of.p99), figure(of.max))

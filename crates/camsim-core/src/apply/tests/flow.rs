@@ -34,7 +34,7 @@ fn flow_of_a_flight_gives_the_sources_of_its_poses() {
         // f32 flow of up to 2 px: 1e-7 of it.
         assert!(error < 1e-6, "{interval_s}: {error}");
         let [flown, flowed] = [&flight, &flow].map(|motion| {
-            Pipeline::new(&spec, &ideal, motion, &Settings::default()).unwrap().render(None).color_rgba
+            Pipeline::new(&spec, &ideal, motion, &Settings::default()).unwrap().render(None).into_color()
         });
         assert!(flown.iter().zip(&flowed).all(|(a, b)| (a - b).abs() < 1e-6));
     }
@@ -116,7 +116,7 @@ fn moving_objects_occlude_and_disocclude_the_background() {
                 if at_rim || is_mixed || now.iter().any(|border| border.abs() < 2.6) {
                     continue;
                 }
-                let pixel = &rendered.color_rgba[4 * (y * 200 + x) as usize..][..4];
+                let pixel = &rendered.color_rgba()[4 * (y * 200 + x) as usize..][..4];
                 // Content that enters from beyond the border is not in the frame.
                 let beyond = !covered && f64::from(x) - share * back > 199.5;
                 let expected = if covered { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 0.0, 1.0, 1.0] };
@@ -142,7 +142,7 @@ fn moving_objects_are_blurred_and_static_ones_are_not() {
     let (ideal, motion) = moving_box(true, 0.0);
     let rendered = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render(None);
     for x in 0..200_u32 {
-        let red = f64::from(rendered.color_rgba[4 * (30 * 200 + x) as usize]);
+        let red = f64::from(rendered.color_rgba()[4 * (30 * 200 + x) as usize]);
         let ramp = |border: f64| (0.5 + (f64::from(x) - border + 0.5) / 10.0).clamp(0.0, 1.0);
         let expected = ramp(BOX_PX[0]) - ramp(BOX_PX[1]);
         // Two samples per pixel of path, and a border pixel that reads both sides.
@@ -163,7 +163,7 @@ fn unknown_flow_is_empty_and_mismatched_flow_is_refused() {
     let (rendered, counts) =
         Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None);
     assert_eq!(counts, NoSourceCounts { unknown_flow: 10 * 20, ..NoSourceCounts::default() });
-    let alpha: Vec<f32> = (24..36).map(|x| rendered.color_rgba[4 * (60 * 7 + x) + 3]).collect();
+    let alpha: Vec<f32> = (24..36).map(|x| rendered.color_rgba()[4 * (60 * 7 + x) + 3]).collect();
     assert_eq!(alpha, [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.]);
     let nowhere = of([120, 40], 0.1, |_| DVec2::NAN);
     let counts =

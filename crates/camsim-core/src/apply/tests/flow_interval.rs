@@ -178,8 +178,8 @@ fn zero_flow_equals_no_motion_with_holes() {
     });
     assert!(still.1.holes > 500, "{:?}", still.1);
     assert_eq!(
-        (still.1, &still.0.color_rgba, &still.0.depth_m),
-        (flowed.1, &flowed.0.color_rgba, &flowed.0.depth_m)
+        (still.1, still.0.color_rgba(), still.0.depth_m()),
+        (flowed.1, flowed.0.color_rgba(), flowed.0.depth_m())
     );
     // A hole moves with the object that contains it.
     let motion = of(IDEAL, 0.033, |_| DVec2::new(12.0, -5.0));

@@ -168,12 +168,12 @@ fn noise_comes_after_the_spread() {
     let camera = CameraSpec { photometric, ..camera(gaussian(3.0)) };
     let optics = Optics::new(&camera, 7).expect("a point spread");
     let color_rgba = picture(|_, _| [0.5, 0.25, 0.1]);
-    let mut frame = RenderedFrame { index: 3, size_px: SIZE_PX, color_rgba, ..RenderedFrame::default() };
+    let mut frame = RenderedFrame { index: 3, ..RenderedFrame::picture(SIZE_PX, color_rgba) };
     optics.expose(&mut frame, None);
     let table = tail_table();
     for (x, y) in [(0, 0), (13, 70), (95, 79)] {
         let expected = photometric_value(&camera, [x, y], &table);
-        assert!((at(&frame.color_rgba, x, y)[0] - expected).abs() < 1e-5);
+        assert!((at(frame.color_rgba(), x, y)[0] - expected).abs() < 1e-5);
     }
 }
 

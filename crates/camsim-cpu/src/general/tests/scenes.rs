@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    frame::RenderedFrame,
+    frame::{Plane, RenderedFrame},
     photometric::vignette_weights,
     reference::{Oracle, RenderOptions},
     scenario::{Channel, MountSpec, Scenario},
@@ -181,9 +181,11 @@ impl Case {
         RenderedFrame {
             index: 0,
             size_px: self.plan.camera.size_px,
-            color_rgba: picture.clone(),
-            depth_m: Some(truth.iter().map(|truth| truth.depth_m).collect()),
-            coords: Some(coords.collect()),
+            planes: vec![
+                Plane::color(picture.clone()),
+                Plane::depth(truth.iter().map(|truth| truth.depth_m).collect()),
+                Plane::coords(coords.collect()),
+            ],
             ..RenderedFrame::default()
         }
     }
@@ -191,7 +193,7 @@ impl Case {
     /// The picture of the reference.
     pub fn expected(&self) -> Vec<f32> {
         let options = RenderOptions { tolerance_dn: 0.2, max_samples: 512, ..RenderOptions::default() };
-        self.oracle.render(0, &options).color_rgba
+        self.oracle.render(0, &options).into_color()
     }
 
     pub fn pixels(&self) -> impl Iterator<Item = (usize, [u32; 2])> {

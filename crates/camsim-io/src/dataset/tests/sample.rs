@@ -6,7 +6,7 @@ use std::{
 };
 
 use camsim_core::{
-    frame::{Plane, PlaneValues, RenderedFrame, RowRecord},
+    frame::{Plane, RenderedFrame, RowRecord},
     pose::{BodyState, CameraPose},
     scenario::{Channel, ImageFormat, Scenario},
     twin::scenario_of,
@@ -238,6 +238,8 @@ pub(super) fn flow(pixel: usize) -> [f32; 3] {
 fn frame(number: u64) -> RenderedFrame {
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let flows: Vec<f32> = (0..pixels).flat_map(flow).collect();
+    // The lens shows nothing in the first pixel.
+    let light = |i| if i == 3 { 0.0 } else { ((i as u64 * 7 + number) % 97) as f32 / 96.0 };
     let row = |row: u32| {
         // A row is a thousandth of a second, about the stamp less 5 ms.
         let t_ns = stamp_ns(number) - 5_000_000 + (2 * i64::from(row) - 3) * 500_000;
@@ -255,16 +257,12 @@ fn frame(number: u64) -> RenderedFrame {
         index: number,
         stamp_ns: stamp_ns(number),
         size_px: SIZE,
-        // The lens shows nothing in the first pixel.
-        color_rgba: (0..pixels * 4)
-            .map(|i| if i == 3 { 0.0 } else { ((i as u64 * 7 + number) % 97) as f32 / 96.0 })
-            .collect(),
-        depth_m: Some((0..pixels).map(|pixel| depth_m(number, pixel)).collect()),
-        coords: None,
+        planes: vec![
+            Plane::color((0..pixels * 4).map(light).collect()),
+            Plane::depth((0..pixels).map(|pixel| depth_m(number, pixel)).collect()),
+            Plane::float(Channel::Flow, flows.clone()),
+            Plane::float(Channel::FlowGlobal, flows),
+        ],
         rows: (0..SIZE[1]).map(row).collect(),
-        raw: None,
-        planes: [Channel::Flow, Channel::FlowGlobal]
-            .map(|channel| Plane { channel, values: PlaneValues::Float(flows.clone()) })
-            .to_vec(),
     }
 }

@@ -6,13 +6,13 @@ use crate::write::encode::{code16, srgb8};
 
 /// Red, green and blue of each pixel in 8 bits.
 pub(super) fn rgb8(frame: &RenderedFrame) -> Vec<u8> {
-    frame.color_rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]].map(srgb8)).collect()
+    frame.color_rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]].map(srgb8)).collect()
 }
 
 /// Red, green and blue of each pixel in 16 bits, little-endian.
 pub(super) fn rgb16(frame: &RenderedFrame) -> Vec<u8> {
     let code = |linear: f32| code16(srgb(linear)).to_le_bytes();
-    frame.color_rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]].map(code)).flatten().collect()
+    frame.color_rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]].map(code)).flatten().collect()
 }
 
 /// sRGB value, 0..=1, of a linear one; 0 for NaN.

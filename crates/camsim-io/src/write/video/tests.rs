@@ -20,13 +20,7 @@ fn frame(index: u64) -> RenderedFrame {
     RenderedFrame {
         index,
         stamp_ns: 1_000_000_000 + 40_000_000 * index as i64,
-        size_px: SIZE,
-        color_rgba,
-        depth_m: None,
-        coords: None,
-        rows: Vec::new(),
-        planes: Vec::new(),
-        raw: None,
+        ..RenderedFrame::picture(SIZE, color_rgba)
     }
 }
 

@@ -56,7 +56,7 @@ impl<W: Write> Y4mStream<W> {
 /// Y', Cb and Cr of all pixels, one after the other.
 fn planes(frame: &RenderedFrame, bits: u32) -> Vec<u8> {
     let codes: Vec<[u16; 3]> =
-        frame.color_rgba.chunks_exact(4).map(|p| ycbcr([p[0], p[1], p[2]], bits)).collect();
+        frame.color_rgba().chunks_exact(4).map(|p| ycbcr([p[0], p[1], p[2]], bits)).collect();
     let plane = |channel: usize| codes.iter().map(move |code| code[channel]);
     let all = [0, 1, 2].into_iter().flat_map(plane);
     if bits > 8 { all.flat_map(u16::to_le_bytes).collect() } else { all.map(|code| code as u8).collect() }

@@ -99,7 +99,8 @@ fn a_lost_device_is_reported_and_opened_anew_and_the_frame_rendered() {
         mailbox.put(request(0));
         let (after, _) = next_frame(replies);
         assert_eq!(
-            after.pictures[0].frame.color_rgba, before.pictures[0].frame.color_rgba,
+            after.pictures[0].frame.color_rgba(),
+            before.pictures[0].frame.color_rgba(),
             "the same picture as before the loss"
         );
     });
