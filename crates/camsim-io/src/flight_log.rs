@@ -45,7 +45,6 @@ mod attitude_columns;
 mod clock_rollover;
 mod column_meaning;
 mod column_names;
-mod column_selection;
 mod columns;
 mod dataflash;
 mod detect;
@@ -66,6 +65,7 @@ mod mcap_file;
 mod message_columns;
 mod missing_columns;
 mod motive;
+mod position_columns;
 mod preamble;
 mod quaternions;
 mod receiver_logs;
@@ -81,20 +81,27 @@ mod statements;
 mod streams;
 mod tagged_lines;
 mod text_table;
+mod time_columns;
 mod time_fields;
 mod time_unit;
 mod ulog;
 mod units;
-mod unknown_unit;
+mod unused_columns;
 mod unused_keys;
+mod word_list;
 mod written_numbers;
-mod xml_prose;
+mod xml;
 
 use columns::{AttitudeColumns, AttitudeKind, Frame};
 use layout::TableLayout;
+use text_table::Table;
 
-use crate::calibration::axes::{enu, enu_from_flu};
-pub use error::FlightLogError;
+use crate::{
+    calibration::axes::{enu, enu_from_flu},
+    similar_file::suggestion,
+};
+
+pub use error::{FlightLogError, LogProblem};
 pub use reference::reference;
 
 /// The rows of a file before cleaning, with notes about them.
@@ -122,27 +129,33 @@ pub fn read_flight_log(
     spec: &FlightSpec,
     height: HeightConversion,
 ) -> Result<FlightLog, FlightLogError> {
-    let raw = read_raw_rows(path, spec)?;
+    let cleaned = read(path, spec).and_then(|raw| cleaned(&raw, spec, height));
+    cleaned.map_err(|problem| FlightLogError { path: path.to_owned(), problem })
+}
+
+/// Reads the rows of a log before any cleaning, in nanoseconds, degrees and metres.
+///
+/// # Errors
+/// As [`read_flight_log`].
+pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
+    read(path, spec).map_err(|problem| FlightLogError { path: path.to_owned(), problem })
+}
+
+/// The log of raw rows, with all notes.
+fn cleaned(raw: &RawLog, spec: &FlightSpec, height: HeightConversion) -> Result<FlightLog, LogProblem> {
     let options = LogOptions::from_spec(spec, height);
-    let mut log = FlightLog::from_raw(&raw.rows, &options).map_err(|source| {
+    let mut log = FlightLog::from_raw(&raw.rows, &options).map_err(|error| {
         // Notes about incomplete attitudes explain a missing one.
-        let attitude_notes: Vec<&str> = raw
-            .notes
-            .iter()
-            .filter(|note| note.text.contains("attitude"))
-            .map(|note| note.text.as_str())
-            .collect();
-        if source == LogError::NoAttitude && !attitude_notes.is_empty() {
-            return FlightLogError::Values {
-                path: path.to_owned(),
-                problem: format!("{source}: {}", attitude_notes.join("; ")),
-            };
+        let attitude_notes: Vec<&str> =
+            raw.notes.iter().map(|note| &*note.text).filter(|text| text.contains("attitude")).collect();
+        if error == LogError::NoAttitude && !attitude_notes.is_empty() {
+            return LogProblem::Content(format!("{error}: {}", attitude_notes.join("; ")));
         }
-        FlightLogError::Log { path: path.to_owned(), source }
+        error.into()
     })?;
     log.notes.clone_from(&raw.notes);
     if spec.attitude == AttitudeSource::Log {
-        let notes = attitude_check::notes(&log, &raw);
+        let notes = attitude_check::notes(&log, raw);
         log.notes.extend(notes);
     }
     without_repetitions(&mut log.notes);
@@ -172,104 +185,68 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
     let first = jumps.next()?;
     let (from, to) = (first[0], first[1]);
     let more = jumps.count();
-    Some(Note {
-        is_warning: true,
-        text: format!(
-            "the flight jumps by {:.0} m within {:.3} s at {:.3} s from its start{}: check the positions and \
+    Some(Note::warning(format!(
+        "the flight jumps by {:.0} m within {:.3} s at {:.3} s from its start{}: check the positions and \
                 times there",
-            from.position_ned_m.distance(to.position_ned_m),
-            to.t_s - from.t_s,
-            from.t_s,
-            if more > 0 { format!(", and in {more} more places") } else { String::new() }
-        ),
-    })
+        from.position_ned_m.distance(to.position_ned_m),
+        to.t_s - from.t_s,
+        from.t_s,
+        if more > 0 { format!(", and in {more} more places") } else { String::new() }
+    )))
 }
 
-/// Reads the rows of a log before any cleaning, in nanoseconds, degrees and metres.
-///
-/// # Errors
-/// As [`read_flight_log`].
-pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
+/// Reads a file as the reader of its kind does.
+fn read(path: &Path, spec: &FlightSpec) -> Result<RawLog, LogProblem> {
     let bytes =
-        std::fs::read(path).map_err(|source| FlightLogError::Read { path: path.to_owned(), source })?;
+        std::fs::read(path).map_err(|source| LogProblem::Read { source, suggestion: suggestion(path) })?;
     if let Some(format) = kinds::detect(path, &bytes, spec) {
-        return kinds::read(format, path, &bytes, spec);
+        return kinds::read(format, &bytes, spec);
     }
-    if let Some((what, advice)) = foreign_formats::detect(&bytes) {
-        return Err(FlightLogError::OtherFormat { path: path.to_owned(), what, advice });
+    if let Some(format) = foreign_formats::detect(&bytes) {
+        return Err(foreign_formats::refusal(format).into());
     }
-    let content = std::str::from_utf8(&bytes)
-        .map_err(|error| FlightLogError::NotText { path: path.to_owned(), offset: error.valid_up_to() })?;
+    let content = std::str::from_utf8(&bytes).map_err(|error| LogProblem::NotText(error.valid_up_to()))?;
     let content = content.strip_prefix('\u{feff}').unwrap_or(content);
     if content.trim_start().starts_with('<') {
-        return gpx::read(path, content.trim_start(), spec);
+        return Ok(gpx::read(content.trim_start(), spec)?);
     }
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
     if matches!(spec.format, LogFormat::Gpx | LogFormat::Kml) {
-        return Err(problem(format!(
-            "flight.format is \"{}\" but the file is no XML; remove the key",
-            columns::format_name(spec.format)
-        )));
+        let name = spec.format.name();
+        return Err(format!("flight.format is \"{name}\" but the file is no XML; remove the key").into());
     }
     if motive::is_motive(content) {
-        return motive::read(path, content, spec);
+        return Ok(motive::read(content, spec)?);
     }
-    let mut table = text_table::Table::new(content);
-    if table.rows.is_empty() {
-        let lines = table.headers.len();
-        // One comment or two are a file without data, not data behind marks.
-        let only_comments = lines > 2 && table.headers.iter().all(|line| line.is_comment);
-        return Err(match only_comments {
-            true => FlightLogError::OnlyComments { path: path.to_owned(), lines },
-            false => FlightLogError::Empty { path: path.to_owned() },
-        });
-    }
+    read_table(content, spec)
+}
+
+/// Reads a table: each step makes new values of those of the steps before it, and notes what it does.
+fn read_table(content: &str, spec: &FlightSpec) -> Result<RawLog, LogProblem> {
+    let table = Table::with_rows(content)?;
     let mut notes = table.notes.clone();
-    notes.extend(unused_keys::unused_topic_note(spec));
-    let layout = TableLayout::detect(path, &table, spec, &mut notes)?;
-    row_selection::keep_rows(&mut table, &layout, &mut notes).map_err(problem)?;
-    let mut rows = rows::read(path, &table, &layout, &mut notes)?;
-    row_states::keep_one_track(&mut table, &layout, &mut rows.rows, &mut notes);
-    row_states::warn_of_states(&table, &layout, &rows.rows, &mut notes);
-    angle_unit::check_degrees(&rows, &layout).map_err(problem)?;
-    let unit_ns = time_unit::time_unit_ns(&rows, &layout, spec, &mut notes).map_err(problem)?;
-    angle_unit::angles_to_degrees(&mut rows, &layout, spec, &mut notes).map_err(problem)?;
-    if let AttitudeColumns::Quaternion(_) = layout.attitude {
-        quaternions::normalise(&mut rows.rows, &mut notes).map_err(problem)?;
-    }
-    let frame = frame_columns::apply(&table, &layout, &mut rows.rows, &mut notes).map_err(problem)?;
-    if rows.time_format == time_fields::TimeFormat::Number {
-        for row in &mut rows.rows {
-            row.time = row.time.and_then(|time| time_fields::to_ns(time, unit_ns)).map(i128::from);
-        }
-    }
-    let has_dates = rows.time_format == time_fields::TimeFormat::DateTime || rows.has_dates;
-    if !has_dates {
-        clock_rollover::unroll_rollovers(
-            &mut rows.rows,
-            rows.time_format == time_fields::TimeFormat::Clock,
-            &mut notes,
-        );
-    }
-    if rows.time_format == time_fields::TimeFormat::Number
-        && let Some(week) = layout.time.week.and_then(|column| table.first_number(column))
-    {
-        clock_rollover::add_week(&mut rows.rows, week, &mut notes);
-    }
-    clock_rollover::leave_out_unset_clock(&mut rows.rows, &mut notes).map_err(problem)?;
-    clock_rollover::check_single_flight(&rows.rows).map_err(problem)?;
-    let (is_geodetic, reads_attitude) =
-        (layout.frame == Frame::Geodetic, layout.attitude != AttitudeColumns::None);
-    stamp_resolution::spread_equal_stamps(&mut rows.rows, &mut notes);
-    held_positions::interpolate_held(&mut rows.rows, is_geodetic, &mut notes);
-    sparse_rows::interpolate_positions(&mut rows.rows, is_geodetic, reads_attitude, &mut notes);
+    let log = &mut notes;
+    log.extend(unused_keys::unused_topic_note(spec));
+    let layout = TableLayout::detect(&table, spec, log)?;
+    let (is_geodetic, kind) = (layout.frame == Frame::Geodetic, layout.attitude.kind());
+
+    let table = row_selection::good_rows(table, &layout, log)?;
+    let parsed = rows::read(&table, &layout, log)?;
+    let (table, parsed) = row_states::one_track(table, &layout, parsed, log);
+    row_states::warn_of_states(&table, &layout, &parsed.rows, log);
+    angle_unit::check_degrees(&parsed.rows, &layout)?;
+    let (clock, rows) = time_unit::in_nanoseconds(parsed, &layout, spec, log)?;
+    let rows = angle_unit::in_degrees(rows, &layout, spec, log)?;
+    let rows = quaternions::normalised(rows, kind, log)?;
+    let (frame, rows) = frame_columns::turned(rows, &table, &layout, log)?;
+    let week = layout.time.week.and_then(|column| table.first_number(column));
+    let rows = clock_rollover::continuous(rows, clock, week, log)?;
+    let rows = stamp_resolution::spread_equal_stamps(rows, log);
+    let rows = held_positions::interpolated(rows, is_geodetic, log);
+    let rows = sparse_rows::interpolated(rows, is_geodetic, kind, log);
+
     if table.has_decimal_commas {
-        notes.push(Note {
-            is_warning: false,
-            text: "commas are read as the beginning of decimals".to_owned(),
-        });
+        notes.push(Note::information("commas are read as the beginning of decimals"));
     }
-    let kind = layout.attitude.kind();
     let quaternions = match layout.attitude {
         AttitudeColumns::Quaternion([x, _, _, w]) => Some(attitude_check::QuaternionReading {
             is_scalar_first: w < x,
@@ -277,7 +254,7 @@ pub fn read_raw_rows(path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLog
         }),
         _ => None,
     };
-    let rows = rows.rows.iter().map(|row| raw_row(row, frame, kind)).collect();
+    let rows = rows.iter().map(|row| raw_row(row, frame, kind)).collect();
     Ok(RawLog { rows, notes, quaternions })
 }
 

@@ -19,6 +19,20 @@ pub struct Note {
     pub text: String,
 }
 
+impl Note {
+    /// A warning.
+    #[must_use]
+    pub fn warning(text: impl Into<String>) -> Self {
+        Self { is_warning: true, text: text.into() }
+    }
+
+    /// Information.
+    #[must_use]
+    pub fn information(text: impl Into<String>) -> Self {
+        Self { is_warning: false, text: text.into() }
+    }
+}
+
 /// A kind of fault, with its count and first occurrences.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Finding {

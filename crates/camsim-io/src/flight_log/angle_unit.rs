@@ -9,7 +9,7 @@ use camsim_core::{
 use super::{
     columns::{AttitudeColumns, FieldSource, Frame},
     layout::TableLayout,
-    rows::ParsedRows,
+    rows::ParsedRow,
     time_unit::format_short,
 };
 use crate::median::median;
@@ -18,20 +18,17 @@ use crate::median::median;
 ///
 /// # Errors
 /// The key contradicts the header, or the unit is not known: the error message.
-pub(super) fn angles_to_degrees(
-    rows: &mut ParsedRows,
+pub(super) fn in_degrees(
+    mut rows: Vec<ParsedRow>,
     layout: &TableLayout,
     spec: &FlightSpec,
     notes: &mut Vec<Note>,
-) -> Result<(), String> {
+) -> Result<Vec<ParsedRow>, String> {
     let AttitudeColumns::Euler(sources) = layout.attitude else {
         if spec.angle_unit != AngleUnit::Auto {
-            notes.push(Note {
-                is_warning: true,
-                text: "flight.angle_unit is not used: no roll, pitch and yaw are read".to_owned(),
-            });
+            notes.push(Note::warning("flight.angle_unit is not used: no roll, pitch and yaw are read"));
         }
-        return Ok(());
+        return Ok(rows);
     };
     let key_factor = unit_of_angle_key(spec.angle_unit);
     let contradicts = |source: &&FieldSource| source.factor.is_some() && source.factor != key_factor;
@@ -43,20 +40,25 @@ pub(super) fn angles_to_degrees(
     }
     let unitless: Vec<usize> = (0..3).filter(|&axis| sources[axis].factor.is_none()).collect();
     let factor = match key_factor {
-        _ if unitless.is_empty() => return Ok(()),
+        _ if unitless.is_empty() => return Ok(rows),
         Some(factor) => factor,
-        None => {
-            infer_degrees_per_unit(rows, &unitless, layout, sources.map(|source| source.column), spec, notes)?
-        }
+        None => infer_degrees_per_unit(
+            &rows,
+            &unitless,
+            layout,
+            sources.map(|source| source.column),
+            spec,
+            notes,
+        )?,
     };
     if factor != 1.0 {
-        for row in &mut rows.rows {
+        for row in &mut rows {
             for &axis in &unitless {
                 row.attitude[axis] *= factor;
             }
         }
     }
-    Ok(())
+    Ok(rows)
 }
 
 /// Degrees per unit that `flight.angle_unit` names; `None` for `auto`.
@@ -72,7 +74,7 @@ pub(super) fn unit_of_angle_key(key: AngleUnit) -> Option<f64> {
 /// yaw wraps around by a turn of radians; degrees where angles exceed the domain of radians.
 // Long because each ambiguity has its own message.
 fn infer_degrees_per_unit(
-    rows: &ParsedRows,
+    rows: &[ParsedRow],
     unitless: &[usize],
     layout: &TableLayout,
     columns: [usize; 3],
@@ -81,7 +83,7 @@ fn infer_degrees_per_unit(
 ) -> Result<f64, String> {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
     let column =
-        |axis: usize| rows.rows.iter().map(move |row| row.attitude[axis]).filter(|value| value.is_finite());
+        |axis: usize| rows.iter().map(move |row| row.attitude[axis]).filter(|value| value.is_finite());
     if spec.angles != AngleKind::Continuous {
         for &axis in unitless {
             let steps = column(axis).zip(column(axis).skip(1)).map(|(a, b)| (b - a).abs());
@@ -89,10 +91,9 @@ fn infer_degrees_per_unit(
                 || steps.into_iter().any(|step| step > 10_000.0)
             {
                 return Err(format!(
-                    "column {}{} holds {}, which is no angle in degrees: name the unit in the header \
+                    "{} holds {}, which is no angle in degrees: name the unit in the header \
                         (yaw_cdeg), or set flight.angles = \"continuous\" if turns count",
-                    columns[axis] + 1,
-                    layout.bracketed_name(columns[axis]),
+                    layout.describe(columns[axis]),
                     format_short(column(axis).fold(0.0, |largest: f64, value| {
                         if value.abs() > largest.abs() { value } else { largest }
                     }))
@@ -113,14 +114,11 @@ fn infer_degrees_per_unit(
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), yaw| (yaw.min(low), yaw.max(high)));
         let tilt = max_abs(0).max(max_abs(1));
         if unitless.len() == 3 && tilt > 0.0 && tilt <= 1.6 && high - low > 6.3 {
-            notes.push(Note {
-                is_warning: true,
-                text: format!(
-                    "roll and pitch are read as degrees like yaw, but never exceed {}: if they are radians, \
+            notes.push(Note::warning(format!(
+                "roll and pitch are read as degrees like yaw, but never exceed {}: if they are radians, \
                         set flight.angle_unit or name the units in the header (roll_rad, yaw_deg)",
-                    format_short(tilt)
-                ),
-            });
+                format_short(tilt)
+            )));
         }
         return Ok(1.0);
     }
@@ -134,32 +132,28 @@ fn infer_degrees_per_unit(
         0
     };
     if jumps > 0 {
-        notes.push(Note {
-            is_warning: true,
-            text: format!(
-                "roll, pitch and yaw are read as radians: their columns name no unit, all stay within a turn \
+        notes.push(Note::warning(format!(
+            "roll, pitch and yaw are read as radians: their columns name no unit, all stay within a turn \
                     of radians, and yaw jumps by one {jumps} times; flight.angle_unit decides"
-            ),
-        });
+        )));
         return Ok(180.0 / PI);
     }
     Err(format!(
-        "roll, pitch and yaw name no unit and stay within pi throughout (column {}{}): set flight.angle_unit \
+        "roll, pitch and yaw name no unit and stay within pi throughout ({}): set flight.angle_unit \
             = \"deg\" or \"rad\", or name the unit in the header (yaw_deg, yaw_rad)",
-        columns[2] + 1,
-        layout.bracketed_name(columns[2])
+        layout.describe(columns[2])
     ))
 }
 
 /// Refuses latitudes and longitudes without a unit that may be radians.
-pub(super) fn check_degrees(rows: &ParsedRows, layout: &TableLayout) -> Result<(), String> {
+pub(super) fn check_degrees(rows: &[ParsedRow], layout: &TableLayout) -> Result<(), String> {
     use std::f64::consts::{FRAC_PI_2, PI};
     let [latitude, longitude, _] = layout.position;
     if layout.frame != Frame::Geodetic || latitude.factor.is_some() || longitude.factor.is_some() {
         return Ok(());
     }
     let column =
-        |axis: usize| rows.rows.iter().filter(|row| row.has_position()).map(move |row| row.position[axis]);
+        |axis: usize| rows.iter().filter(|row| row.has_position()).map(move |row| row.position[axis]);
     let mut latitudes: Vec<f64> = column(0).map(f64::abs).filter(|value| *value > 0.0).collect();
     // Such degrees lie in the Gulf of Guinea, where no land is. Close to the equator they are a made-up
     // place.

@@ -3,7 +3,10 @@
 
 use camsim_core::flight_log::Note;
 
-use super::rows::ParsedRow;
+use super::{
+    rows::ParsedRow,
+    time_fields::{Clock, TimeFormat},
+};
 use crate::median::median;
 
 const DAY_NS: i128 = 86_400_000_000_000;
@@ -17,12 +20,34 @@ const ROLLOVER_PERIODS: [(i128, &str); 4] = [
     (4_294_967_296_000_000, "a counter of 32 bits for milliseconds"),
 ];
 
+/// Times that go on where the clock restarts, in the weeks of which they are, without those of a clock that is
+/// not set yet.
+///
+/// # Errors
+/// There are several flights, or years between the rows.
+pub(super) fn continuous(
+    mut rows: Vec<ParsedRow>,
+    clock: Clock,
+    week: Option<f64>,
+    notes: &mut Vec<Note>,
+) -> Result<Vec<ParsedRow>, String> {
+    if clock.format != TimeFormat::DateTime && !clock.has_dates {
+        unroll_rollovers(&mut rows, clock.format == TimeFormat::Clock, notes);
+    }
+    if let Some(week) = week.filter(|_| clock.format == TimeFormat::Number) {
+        add_week(&mut rows, week, notes);
+    }
+    leave_out_unset_clock(&mut rows, notes)?;
+    check_single_flight(&rows)?;
+    Ok(rows)
+}
+
 /// Adds one rollover period wherever the clock restarts. Times are nanoseconds in the file's order. A clock
 /// time of day (`is_clock_of_day`) rolls over at midnight only.
 ///
 /// A rollover is a fall by more than half a period, to a time that continues the clock within one minute or
 /// 20 median steps. Other falls are rows out of order, which are sorted later.
-pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, notes: &mut Vec<Note>) {
+fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, notes: &mut Vec<Note>) {
     let times_ns: Vec<i128> = rows.iter().filter_map(|row| row.time).collect();
     let (Some(&min_ns), Some(&max_ns)) = (times_ns.iter().min(), times_ns.iter().max()) else { return };
     let mut steps_ns: Vec<i128> =
@@ -51,13 +76,10 @@ pub(super) fn unroll_rollovers(rows: &mut [ParsedRow], is_clock_of_day: bool, no
         row.time = Some(time_ns + rollovers * period_ns);
     }
     lines.truncate(8);
-    notes.push(Note {
-        is_warning: true,
-        text: format!(
-            "the clock begins again at line {}, after {period_name}: the times go on from there",
-            lines.join(", ")
-        ),
-    });
+    notes.push(Note::warning(format!(
+        "the clock begins again at line {}, after {period_name}: the times go on from there",
+        lines.join(", ")
+    )));
 }
 
 /// The beginning of the first GPS week, 1980-01-06.
@@ -66,7 +88,7 @@ const FIRST_WEEK_NS: i128 = 315_964_800_000_000_000;
 const WEEKS: std::ops::Range<f64> = 1000.0..6300.0;
 
 /// Adds the week of the first row to seconds of the week, which go on at its end already.
-pub(super) fn add_week(rows: &mut [ParsedRow], week: f64, notes: &mut Vec<Note>) {
+fn add_week(rows: &mut [ParsedRow], week: f64, notes: &mut Vec<Note>) {
     let first_ns = rows.iter().find_map(|row| row.time);
     if !WEEKS.contains(&week) || !first_ns.is_some_and(|time| (0..=7 * DAY_NS).contains(&time)) {
         return;
@@ -74,10 +96,8 @@ pub(super) fn add_week(rows: &mut [ParsedRow], week: f64, notes: &mut Vec<Note>)
     for time in rows.iter_mut().filter_map(|row| row.time.as_mut()) {
         *time += FIRST_WEEK_NS + week as i128 * 7 * DAY_NS;
     }
-    notes.push(Note {
-        is_warning: false,
-        text: format!("the times count from GPS week {week:.0} on, without leap seconds"),
-    });
+    notes
+        .push(Note::information(format!("the times count from GPS week {week:.0} on, without leap seconds")));
 }
 
 /// The year 2000. Clocks that are not set yet begin in 1970, 1980, 2000 or at the date of their firmware.
@@ -89,7 +109,7 @@ const YEAR_NS: i128 = 365 * DAY_NS;
 ///
 /// # Errors
 /// Years lie between the rows, and most of them are before.
-pub(super) fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<Note>) -> Result<(), String> {
+fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<Note>) -> Result<(), String> {
     let mut times: Vec<(i128, usize)> =
         rows.iter().filter_map(|row| row.time.map(|time| (time, row.line))).collect();
     times.sort_unstable();
@@ -102,13 +122,10 @@ pub(super) fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<N
     }
     let first_set_ns = times[unset].0;
     rows.retain(|row| row.time.is_none_or(|time| time >= first_set_ns));
-    notes.push(Note {
-        is_warning: true,
-        text: format!(
-            "{unset} rows have times {years:.0} years before the others, as of a clock that is not set yet, \
+    notes.push(Note::warning(format!(
+        "{unset} rows have times {years:.0} years before the others, as of a clock that is not set yet, \
                 and are left out"
-        ),
-    });
+    )));
     Ok(())
 }
 

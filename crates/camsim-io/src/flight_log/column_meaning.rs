@@ -1,6 +1,8 @@
 //! Meanings of columns.
 
-use super::units::VerticalDatum;
+use camsim_core::scenario::HeightReference;
+
+use super::units::Dimension;
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +20,7 @@ pub(super) enum ColumnMeaning {
     Latitude,
     Longitude,
     /// Height, up, above the datum that its name states, else above that of `flight.height`.
-    Height(Option<VerticalDatum>),
+    Height(Option<HeightReference>),
     /// Height by air pressure; used only where no column is a [`ColumnMeaning::Height`].
     PressureHeight,
     /// Height above take-off or ground, which is refused as the only height.
@@ -62,6 +64,32 @@ pub(super) enum ColumnMeaning {
     Fix(FixCode),
     /// What the heights are above, in words.
     HeightDatum,
+}
+
+impl ColumnMeaning {
+    pub(super) fn is_time(self) -> bool {
+        matches!(self, Self::Time | Self::DateTime | Self::NanosecondsPart)
+    }
+
+    /// Whether a column is a height, of any kind.
+    pub(super) fn is_height(self) -> bool {
+        matches!(self, Self::Height(_) | Self::PressureHeight | Self::RelativeHeight)
+    }
+
+    /// The physical dimension of a column; `None` where it has no unit.
+    pub(super) fn dimension(self) -> Option<Dimension> {
+        use ColumnMeaning::*;
+        match self {
+            Time | NanosecondsPart => Some(Dimension::Time),
+            Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => {
+                Some(Dimension::Angle)
+            }
+            Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid
+            | EarthCentred | X | Y | Z => Some(Dimension::Length),
+            DateTime | Date | Hemisphere | TimePart | Vehicle | Receiver | InUse | Fix(_) | HeightDatum
+            | Qx | Qy | Qz | Qw => None,
+        }
+    }
 }
 
 impl FixCode {

@@ -1,7 +1,5 @@
 //! The columns that a flight is read from: axes, units, and the fields of each number.
 
-use camsim_core::scenario::LogFormat;
-
 /// Axes of the positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Frame {
@@ -75,7 +73,7 @@ pub(super) enum AttitudeKind {
 }
 
 /// The columns of the time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct TimeColumns {
     /// Index of the column, from 0.
     pub(super) column: usize,
@@ -89,22 +87,4 @@ pub(super) struct TimeColumns {
     pub(super) week: Option<usize>,
     /// Column of nanoseconds that are added to whole seconds.
     pub(super) nanoseconds: Option<usize>,
-}
-
-/// The format as `flight.format` names it.
-pub(super) fn format_name(format: LogFormat) -> &'static str {
-    match format {
-        LogFormat::Auto => "auto",
-        LogFormat::CsvLla => "csv-lla",
-        LogFormat::CsvXya => "csv-xya",
-        LogFormat::CsvNed => "csv-ned",
-        LogFormat::Tum => "tum",
-        LogFormat::Euroc => "euroc",
-        LogFormat::Gpx => "gpx",
-        LogFormat::Kml => "kml",
-        LogFormat::Igc => "igc",
-        LogFormat::Ulog => "ulog",
-        LogFormat::Dataflash => "dataflash",
-        LogFormat::Mcap => "mcap",
-    }
 }

@@ -14,18 +14,16 @@
 //! Of several cores or receivers the one that the vehicle used is flown (`instances`). Times are `TimeUS`, or
 //! `TimeMS` in old logs.
 
-use std::path::Path;
-
 use camsim_core::{
     flight_log::Note,
-    scenario::{AttitudeSource, FlightSpec, LogFormat},
+    scenario::{AttitudeSource, FlightSpec, HeightReference},
 };
 
 use super::{
-    FlightLogError, RawLog,
+    RawLog,
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
-    streams::{self, Stream, Streams},
+    streams::{self, Stream, Streams, listed},
     unused_keys::unused_height_note,
 };
 
@@ -46,27 +44,24 @@ const DEG_PER_M: f64 = 1e-7 / 0.011_131_884_502_145_034;
 ///
 /// # Errors
 /// The file is no DataFlash file, or has no positions, or not those that `flight.topic` names.
-pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    streams::check_format(path, spec, LogFormat::Dataflash)?;
-    let file = DataflashFile::parse(bytes).map_err(problem)?;
-    let mut notes: Vec<Note> =
-        file.damage.iter().map(|text| Note { is_warning: true, text: text.clone() }).collect();
+pub(super) fn read(bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, String> {
+    let file = DataflashFile::parse(bytes)?;
+    let mut notes: Vec<Note> = file.damage.iter().map(Note::warning).collect();
     notes.extend(unused_height_note(spec));
     let (position_name, attitude_name) = streams::named_topics(spec);
-    let chosen = choose(&file, position_name).map_err(problem)?;
-    let mut position = chosen.stream(&file, &mut notes).map_err(problem)?;
-    notes.extend(streams::height_note("heights of ArduPilot", true, spec));
+    let chosen = choose(&file, position_name)?;
+    let mut position = chosen.stream(&file, &mut notes)?;
+    notes.extend(streams::height_note("heights of ArduPilot", HeightReference::Msl, spec));
     let wants_other = attitude_name.is_some() || attitude_columns(chosen.message).is_none();
     let (attitude, kind) = if spec.attitude == AttitudeSource::Track {
         (None, AttitudeKind::None)
     } else if wants_other {
         position.rows.iter_mut().for_each(|row| row.attitude = [f64::NAN; 4]);
-        attitude_stream(&file, attitude_name, &mut notes).map_err(problem)?
+        attitude_stream(&file, attitude_name, &mut notes)?
     } else {
         (None, AttitudeKind::Euler)
     };
-    Streams { frame: Frame::Geodetic, kind, position, attitude, notes }.into_log(path, spec)
+    Streams { frame: Frame::Geodetic, kind, position, attitude, notes }.into_log(spec)
 }
 
 /// A message that is read, with the instance of it that `flight.topic` names.
@@ -109,17 +104,16 @@ fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Cho
         }
         return Ok(Chosen { message, parts: instances::parts(file, message), instance });
     }
-    let all: Vec<&str> = file
+    let all: Vec<String> = file
         .all()
         .into_iter()
         .filter(|message| place(message).is_some() && message.name != "ORGN" && message.name != "CMD")
-        .map(|message| message.name.as_str())
+        .map(|message| message.name.clone())
         .collect();
     Err(match (name, all.is_empty()) {
-        (Some(name), _) => format!(
-            "flight.topic: `{name}` is no message with positions; there are: {}",
-            if all.is_empty() { "none".to_owned() } else { all.join(", ") }
-        ),
+        (Some(name), _) => {
+            format!("flight.topic: `{name}` is no message with positions; there are: {}", listed(&all))
+        }
         (None, true) => "the ArduPilot log has no positions (POS, AHR2, XKF1, GPS): set LOG_BITMASK to log \
             them"
             .to_owned(),
@@ -192,10 +186,9 @@ impl Chosen<'_, '_> {
             rows.push(row);
         }
         if without_fix > 0 {
-            notes.push(Note {
-                is_warning: true,
-                text: format!("{without_fix} positions of `{name}` have no 3D fix, and are left out"),
-            });
+            notes.push(Note::warning(format!(
+                "{without_fix} positions of `{name}` have no 3D fix, and are left out"
+            )));
         }
         Ok(Stream { name, rows })
     }
@@ -222,15 +215,15 @@ fn attitude_stream(
         file.find(stem).filter(|&message| euler(message).is_some() || quaternion(message).is_some())
     else {
         let Some(name) = name else { return Ok((None, AttitudeKind::None)) };
-        let all: Vec<&str> = file
+        let all: Vec<String> = file
             .all()
             .into_iter()
             .filter(|message| euler(message).is_some() || quaternion(message).is_some())
-            .map(|message| message.name.as_str())
+            .map(|message| message.name.clone())
             .collect();
         return Err(format!(
             "flight.topic: `{name}` is no message with attitudes; there are: {}",
-            if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+            listed(&all)
         ));
     };
     let parts = instances::parts(file, message);

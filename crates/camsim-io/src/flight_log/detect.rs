@@ -1,12 +1,10 @@
 //! Detection of the format of a table without a header, from its values.
 
-use std::path::Path;
-
 use camsim_core::scenario::{FlightSpec, LogFormat};
 use glam::DVec3;
 
 use super::{
-    FlightLogError,
+    error::LogProblem,
     text_table::{Line, Separator, Table},
     time_fields,
     time_unit::unit_of_key,
@@ -21,12 +19,7 @@ const MIN_NANOSECONDS: f64 = 1e14;
 ///
 /// # Errors
 /// No format fits, or several do.
-pub(super) fn detect_format(
-    path: &Path,
-    table: &Table<'_>,
-    spec: &FlightSpec,
-) -> Result<LogFormat, FlightLogError> {
-    let ambiguous = |candidates| FlightLogError::Ambiguous { path: path.to_owned(), candidates };
+pub(super) fn detect_format(table: &Table<'_>, spec: &FlightSpec) -> Result<LogFormat, LogProblem> {
     let time_factor = unit_of_key(spec.time_unit).map_or(1.0, |unit| unit.factor * 1e-9);
     let value = |index: usize, field: &str| match table.number(field) {
         Some(value) if index == 0 => value * time_factor,
@@ -41,23 +34,22 @@ pub(super) fn detect_format(
         .collect();
     if (table.columns >= 8 && has_quaternions(&sample)) || (table.columns == 8 && lacks_quaternions(&sample))
     {
-        let first_time =
-            table.rows.first().and_then(|row| table.number(table.fields(row).first().copied().unwrap_or("")));
+        let first_time = table.column(0).next().and_then(|field| table.number(field));
         // TUM files have seconds and blanks, EuRoC files nanoseconds and commas. With any other combination
         // the order of the quaternion is unknown.
         return match (first_time.is_some_and(|time| time >= MIN_NANOSECONDS), table.separator) {
             (true, Separator::Comma) => Ok(LogFormat::Euroc),
             (false, Separator::Space) => Ok(LogFormat::Tum),
-            _ => Err(ambiguous("tum (qx qy qz qw) and euroc (qw qx qy qz)")),
+            _ => Err(LogProblem::Ambiguous("tum (qx qy qz qw) and euroc (qw qx qy qz)")),
         };
     }
     if table.columns != 4 && table.columns != 7 {
-        return Err(FlightLogError::UnknownLayout { path: path.to_owned(), columns: table.columns });
+        return Err(LogProblem::UnknownLayout(table.columns));
     }
     if only_geodetic_fits(&sample) {
         Ok(LogFormat::CsvLla)
     } else {
-        Err(ambiguous(metric_candidates(&sample)))
+        Err(LogProblem::Ambiguous(metric_candidates(&sample)))
     }
 }
 
@@ -119,7 +111,7 @@ fn metric_candidates(sample: &[Vec<f64>]) -> &'static str {
 }
 
 /// Refuses KITTI poses: twelve columns, whose left 3x3 block is a rotation matrix.
-pub(super) fn refuse_pose_matrices(path: &Path, table: &Table<'_>) -> Result<(), FlightLogError> {
+pub(super) fn refuse_pose_matrices(table: &Table<'_>) -> Result<(), LogProblem> {
     let is_matrix = |row: &Line<'_>| {
         let values: Option<Vec<f64>> = table.fields(row).iter().map(|field| table.number(field)).collect();
         values.is_some_and(|v| {
@@ -133,5 +125,5 @@ pub(super) fn refuse_pose_matrices(path: &Path, table: &Table<'_>) -> Result<(),
     let (rows, matrices) = table
         .sample(20)
         .fold((0, 0), |(rows, matrices), row| (rows + 1, matrices + usize::from(is_matrix(row))));
-    if rows == matrices { Err(FlightLogError::PoseMatrices { path: path.to_owned() }) } else { Ok(()) }
+    if rows == matrices { Err(LogProblem::PoseMatrices) } else { Ok(()) }
 }

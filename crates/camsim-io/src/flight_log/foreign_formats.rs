@@ -2,100 +2,71 @@
 
 use super::receiver_logs;
 
-/// A file format that is refused.
-pub(super) struct ForeignFormat {
-    /// Name with its article, as error messages print it.
-    pub(super) name: &'static str,
-    /// File signatures: the first bytes, any of them.
-    signatures: &'static [&'static [u8]],
-    /// How to convert it.
-    pub(super) advice: &'static str,
-}
-
-/// Formats recognised by their signature. docs/reference/inputs/LOGS.md lists them.
-pub(super) static FOREIGN_FORMATS: &[ForeignFormat] = &[
-    ForeignFormat {
-        name: "an ArduPilot log as text",
-        signatures: &[b"FMT,", b"FMT ,"],
-        advice: "give the binary log (.bin), or export a table of POS and ATT",
-    },
-    ForeignFormat {
-        name: "a ROS 1 bag",
-        signatures: &[b"#ROSBAG"],
-        advice: "convert it to MCAP (mcap convert FILE.bag flight.mcap)",
-    },
-    ForeignFormat {
-        name: "a database (SQLite), as ROS 2 bags of the kind .db3 are",
-        signatures: &[b"SQLite format 3"],
-        advice: "convert it to MCAP (ros2 bag convert, with `storage_id: mcap` in its output options, or mcap \
+/// Formats recognised by their signatures: name with its article, as messages print it; first bytes, any of
+/// them; and how to convert it. docs/reference/inputs/LOGS.md lists them.
+pub(super) static FOREIGN_FORMATS: &[(&str, &[&[u8]], &str)] = &[
+    (
+        "an ArduPilot log as text",
+        &[b"FMT,", b"FMT ,"],
+        "give the binary log (.bin), or export a table of POS and ATT",
+    ),
+    ("a ROS 1 bag", &[b"#ROSBAG"], "convert it to MCAP (mcap convert FILE.bag flight.mcap)"),
+    (
+        "a database (SQLite), as ROS 2 bags of the kind .db3 are",
+        &[b"SQLite format 3"],
+        "convert it to MCAP (ros2 bag convert, with `storage_id: mcap` in its output options, or mcap \
             convert FILE.db3 flight.mcap)",
-    },
-    ForeignFormat {
-        name: "compressed",
-        signatures: &[b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"],
-        advice: "unpack it first",
-    },
-    ForeignFormat {
-        name: "a spreadsheet or an archive",
-        signatures: &[b"PK\x03\x04", b"\xd0\xcf\x11\xe0"],
-        advice: "unpack it, or save the sheet as CSV in UTF-8",
-    },
-    ForeignFormat {
-        name: "text in UTF-16",
-        signatures: &[b"\xff\xfe", b"\xfe\xff"],
-        advice: "save it as UTF-8",
-    },
-    ForeignFormat {
-        name: "NMEA sentences",
-        signatures: &[b"$GP", b"$GN", b"$GL", b"!AIV"],
-        advice: "convert it to GPX (gpsbabel -i nmea -f FILE -o gpx -F flight.gpx)",
-    },
-    ForeignFormat {
-        name: "a picture",
-        signatures: &[b"II*\0", b"II+\0", b"MM\0*", b"MM\0+", b"\x89PNG", b"\xff\xd8\xff", b"RIFF"],
-        advice: "flight.log is the file of times and positions; terrain and pictures of the ground go to [scene]",
-    },
-    ForeignFormat {
-        name: "a Betaflight or INAV blackbox log",
-        signatures: &[b"H Product:Blackbox"],
-        advice: "convert it with blackbox_decode --merge-gps, and name the units in its header line",
-    },
-    ForeignFormat {
-        name: "messages of a u-blox receiver",
-        signatures: &[b"\xb5\x62"],
-        advice: "convert it to GPX or CSV with the receiver's program, or to .pos with RTKLIB",
-    },
-    ForeignFormat {
-        name: "a table for a program (HDF5, NumPy, Parquet, MATLAB)",
-        signatures: &[b"\x89HDF", b"\x93NUMPY", b"PAR1", b"MATLAB 5.0"],
-        advice: "write its rows as CSV with a header line",
-    },
-    ForeignFormat {
-        name: "a document (PDF, PostScript, RTF)",
-        signatures: &[b"%PDF", b"%!PS", b"{\\rtf"],
-        advice: "flight.log is the file of times and positions",
-    },
-    ForeignFormat {
-        name: "a model (glTF)",
-        signatures: &[b"glTF"],
-        advice: "flight.log is the file of times and positions; models go to scene.gltf",
-    },
-    ForeignFormat {
-        name: "a point cloud (LAS)",
-        signatures: &[b"LASF"],
-        advice: "flight.log is the file of times and positions of the aircraft",
-    },
-    ForeignFormat {
-        name: "a binary log of a NovAtel or Septentrio receiver",
-        signatures: &[b"\xaa\x44\x12", b"\xaa\x44\x13", b"$@"],
-        advice: "convert it to a table with NovAtel Convert or RxTools (time, latitude, longitude, height, roll, \
+    ),
+    (
+        "compressed",
+        &[b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"],
+        "unpack it first",
+    ),
+    (
+        "a spreadsheet or an archive",
+        &[b"PK\x03\x04", b"\xd0\xcf\x11\xe0"],
+        "unpack it, or save the sheet as CSV in UTF-8",
+    ),
+    ("text in UTF-16", &[b"\xff\xfe", b"\xfe\xff"], "save it as UTF-8"),
+    (
+        "NMEA sentences",
+        &[b"$GP", b"$GN", b"$GL", b"!AIV"],
+        "convert it to GPX (gpsbabel -i nmea -f FILE -o gpx -F flight.gpx)",
+    ),
+    (
+        "a picture",
+        &[b"II*\0", b"II+\0", b"MM\0*", b"MM\0+", b"\x89PNG", b"\xff\xd8\xff", b"RIFF"],
+        "flight.log is the file of times and positions; terrain and pictures of the ground go to [scene]",
+    ),
+    (
+        "a Betaflight or INAV blackbox log",
+        &[b"H Product:Blackbox"],
+        "convert it with blackbox_decode --merge-gps, and name the units in its header line",
+    ),
+    (
+        "messages of a u-blox receiver",
+        &[b"\xb5\x62"],
+        "convert it to GPX or CSV with the receiver's program, or to .pos with RTKLIB",
+    ),
+    (
+        "a table for a program (HDF5, NumPy, Parquet, MATLAB)",
+        &[b"\x89HDF", b"\x93NUMPY", b"PAR1", b"MATLAB 5.0"],
+        "write its rows as CSV with a header line",
+    ),
+    (
+        "a document (PDF, PostScript, RTF)",
+        &[b"%PDF", b"%!PS", b"{\\rtf"],
+        "flight.log is the file of times and positions",
+    ),
+    ("a model (glTF)", &[b"glTF"], "flight.log is the file of times and positions; models go to scene.gltf"),
+    ("a point cloud (LAS)", &[b"LASF"], "flight.log is the file of times and positions of the aircraft"),
+    (
+        "a binary log of a NovAtel or Septentrio receiver",
+        &[b"\xaa\x44\x12", b"\xaa\x44\x13", b"$@"],
+        "convert it to a table with NovAtel Convert or RxTools (time, latitude, longitude, height, roll, \
             pitch, azimuth)",
-    },
-    ForeignFormat {
-        name: "JSON",
-        signatures: &[b"{", b"[{", b"[\n"],
-        advice: "write its rows as CSV with a header line",
-    },
+    ),
+    ("JSON", &[b"{", b"[{", b"[\n"], "write its rows as CSV with a header line"),
 ];
 
 /// Subtitles, recognised by their second line: name and advice. docs/reference/inputs/LOGS.md lists them.
@@ -133,6 +104,11 @@ pub(super) static OTHER_BINARY: [(&str, &str); 4] = [MAVLINK, VIDEO, FIT, BINARY
 pub(super) const OTHER_XML: (&str, &str) =
     ("XML other than GPX and KML", "write a CSV with a header line, or GPX");
 
+/// Message for such a file.
+pub(super) fn refusal((name, advice): (&str, &str)) -> String {
+    format!("the file is {name}, no flight log that can be read: {advice}")
+}
+
 /// Name and advice of the format of a file that cannot be a flight log; `None` if it may be one.
 pub(super) fn detect(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
@@ -140,10 +116,11 @@ pub(super) fn detect(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     if is_mavlink(bytes) {
         return Some(MAVLINK);
     }
-    let has_signature =
-        |format: &&ForeignFormat| format.signatures.iter().any(|bytes| text.starts_with(bytes));
-    if let Some(format) = FOREIGN_FORMATS.iter().find(has_signature) {
-        return Some((format.name, format.advice));
+    let by_signature = FOREIGN_FORMATS
+        .iter()
+        .find(|(_, signatures, _)| signatures.iter().any(|bytes| text.starts_with(bytes)));
+    if let Some(&(name, _, advice)) = by_signature {
+        return Some((name, advice));
     }
     let second_line = text.split(|&byte| byte == b'\n').nth(1).unwrap_or(b"");
     let first_has_digits_only = text

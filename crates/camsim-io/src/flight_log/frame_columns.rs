@@ -23,25 +23,25 @@ struct FrameName {
     name: String,
 }
 
-/// Turns poses of x, y, z to the axes that columns of frames state. Returns the axes of the rows. Rows are as
-/// many as those of the table.
+/// Turns poses of x, y, z to the axes that columns of frames state. Returns the axes of the rows, too. Rows are
+/// as many as those of the table.
 ///
 /// # Errors
 /// There are several frames, or positions in them are no flight.
-pub(super) fn apply(
+pub(super) fn turned(
+    mut rows: Vec<ParsedRow>,
     table: &Table<'_>,
     layout: &TableLayout,
-    rows: &mut [ParsedRow],
     notes: &mut Vec<Note>,
-) -> Result<Frame, String> {
+) -> Result<(Frame, Vec<ParsedRow>), String> {
     let is_child = |name: &str| name.ends_with("child_frame_id");
     if layout.frame == Frame::Geodetic {
-        return Ok(layout.frame);
+        return Ok((layout.frame, rows));
     }
     let world = frame_name(table, layout, |name| name.ends_with("frame_id") && !is_child(name))?;
     let body = frame_name(table, layout, is_child)?;
-    let Some(first) = world.as_ref().or(body.as_ref()) else { return Ok(layout.frame) };
-    let described = format!("column {}{}", first.column + 1, layout.bracketed_name(first.column));
+    let Some(first) = world.as_ref().or(body.as_ref()) else { return Ok((layout.frame, rows)) };
+    let described = layout.describe(first.column);
     if let Some(frame) = world.as_ref().filter(|frame| frames::is_geocentric(&frame.name)) {
         return Err(format!(
             "{described} says `{}`, whose positions are geocentric (REP 105): give poses in `map` or `odom`",
@@ -50,11 +50,11 @@ pub(super) fn apply(
     }
     if layout.frame != Frame::EastNorthUp {
         notes.extend(world.and_then(|frame| contradiction(layout.frame, &described, &frame.name)));
-        return Ok(layout.frame);
+        return Ok((layout.frame, rows));
     }
     let has_axes = [&world, &body].into_iter().flatten().any(|frame| frames::states_axes(&frame.name));
     if !has_axes {
-        return Ok(layout.frame);
+        return Ok((layout.frame, rows));
     }
     let (world_name, body_name) =
         (world.map_or(String::new(), |frame| frame.name), body.map(|frame| Arc::from(frame.name)));
@@ -79,20 +79,17 @@ pub(super) fn apply(
         row.position = sample.position.unwrap_or([f64::NAN; 3]);
         row.attitude = if has_rotations { sample.rotation.unwrap_or([f64::NAN; 4]) } else { row.attitude };
     }
-    Ok(Frame::NorthEastDown)
+    Ok((Frame::NorthEastDown, rows))
 }
 
 /// A warning where a frame has other axes than positions that are read by their names or by flight.format.
 fn contradiction(frame: Frame, described: &str, name: &str) -> Option<Note> {
     let read_as = if frame == Frame::NorthEastDown { "north-east-down" } else { "north-east-up" };
     let stated = frames::world_axes(name).filter(|stated| stated != read_as)?;
-    Some(Note {
-        is_warning: true,
-        text: format!(
-            "{described} says `{name}` ({stated}), but positions are read as {read_as}: flight.format = \"tum\" \
+    Some(Note::warning(format!(
+        "{described} says `{name}` ({stated}), but positions are read as {read_as}: flight.format = \"tum\" \
                 reads x, y, z as the frame says"
-        ),
-    })
+    )))
 }
 
 /// The first column of such a name in normal form, and the name of the frame in it.
@@ -104,19 +101,19 @@ fn frame_name(
     let Some(column) = layout.names.iter().position(|name| is_name(&normal_form(name))) else {
         return Ok(None);
     };
-    let mut fields = Vec::new();
     let mut found: Option<&str> = None;
     for line in &table.rows {
-        table.separator.split(line.text, &mut fields);
-        let Some(name) = fields.get(column).copied().filter(|name| !is_missing(name)) else { continue };
+        let name = table.field(line, column);
+        if is_missing(name) {
+            continue;
+        }
         let first = *found.get_or_insert(name);
         let differs = frames::states_axes(first) || frames::states_axes(name);
         if first != name && differs {
             return Err(format!(
-                "line {}: `{name}` in column {}{}, but `{first}` before: keep the rows of one frame",
+                "line {}: `{name}` in {}, but `{first}` before: keep the rows of one frame",
                 line.number,
-                column + 1,
-                layout.bracketed_name(column)
+                layout.describe(column)
             ));
         }
     }

@@ -8,7 +8,7 @@
 //! | `unit` of an `ele` | applied |
 //! | `wpt`, `rte`, `extensions` and other tags of a point | not used, named in a note |
 
-use std::{collections::BTreeSet, path::Path};
+use std::collections::BTreeSet;
 
 use camsim_core::{
     flight_log::{Note, RawAttitude, RawPosition, RawRow},
@@ -18,124 +18,94 @@ use camsim_core::{
 use roxmltree::{Document, Node};
 
 use super::{
-    FlightLogError, RawLog,
-    columns::format_name,
-    foreign_formats, kml, time_fields,
+    RawLog, foreign_formats, kml, streams,
     units::{self, Dimension, Qualifier},
     unused_keys::{unused_height_note, unused_topic_note},
-    xml_prose,
+    xml::{self, children, elements, line},
 };
 
 /// Reads the track points of a GPX file.
 ///
 /// # Errors
 /// The text is no XML, no GPX, or has no usable track points.
-pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let foreign = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat {
-        path: path.to_owned(),
-        what,
-        advice,
-    };
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    let document = Document::parse(text).map_err(|error| problem(format!("not valid XML: {error}")))?;
+pub(super) fn read(text: &str, spec: &FlightSpec) -> Result<RawLog, String> {
+    let document = Document::parse(text).map_err(|error| format!("not valid XML: {error}"))?;
     match document.root_element().tag_name().name() {
         "gpx" => {}
-        "kml" => return kml::read(path, &document, spec),
-        _ => return Err(foreign(foreign_formats::OTHER_XML)),
+        "kml" => return kml::read(&document, spec),
+        _ => return Err(foreign_formats::refusal(foreign_formats::OTHER_XML)),
     }
     if !matches!(spec.format, LogFormat::Auto | LogFormat::Gpx) {
-        return Err(problem(format!(
-            "flight.format is \"{}\" but the file is GPX; remove the key",
-            format_name(spec.format)
-        )));
+        return Err(streams::other_format(spec, "GPX"));
     }
-    let points: Vec<Node<'_, '_>> =
-        document.descendants().filter(|node| node.has_local_name("trkpt")).collect();
+    let points: Vec<Node<'_, '_>> = elements(document.root(), "trkpt").collect();
     if points.is_empty() {
-        return Err(problem(
+        return Err(
             "the GPX file has no track points (trkpt); waypoints and routes have no times and are not flown"
                 .to_owned(),
-        ));
+        );
     }
     for (name, advice) in [("time", "record the track with times"), ("ele", "add heights (ele)")] {
-        if points.iter().all(|point| child(point, name).is_none()) {
-            return Err(problem(format!(
-                "no track point has a `{name}`: a flight needs times and heights; {advice}"
-            )));
+        if points.iter().all(|&point| child(point, name).is_none()) {
+            return Err(format!("no track point has a `{name}`: a flight needs times and heights; {advice}"));
         }
     }
-    let line = |point: &Node<'_, '_>| document.text_pos_at(point.range().start).row as usize;
     let mut notes = notes(&document, &points, spec);
-    notes.extend(xml_prose::notes(&document));
+    notes.extend(xml::notes(&document));
     let flown = with_fix(&points, &mut notes);
     if flown.is_empty() {
-        return Err(problem("no track point has a fix (`fix` is none): the receiver had none".to_owned()));
+        return Err("no track point has a fix (`fix` is none): the receiver had none".to_owned());
     }
-    let rows = flown.iter().map(|point| raw_row(path, point, line(point))).collect::<Result<_, _>>()?;
+    let rows = flown.into_iter().map(raw_row).collect::<Result<_, _>>()?;
     Ok(RawLog { rows, notes, quaternions: None })
 }
 
 /// The points with a fix, of three dimensions where any has one.
 fn with_fix<'a, 'b>(points: &[Node<'a, 'b>], notes: &mut Vec<Note>) -> Vec<Node<'a, 'b>> {
-    let dimensions = |point: &Node<'_, '_>| match child(point, "fix").as_deref().map(str::to_ascii_lowercase)
-    {
-        Some(fix) if fix == "none" => 0,
-        Some(fix) if fix == "2d" => 2,
+    let dimensions = |point: Node<'_, '_>| match child(point, "fix").map(str::to_ascii_lowercase).as_deref() {
+        Some("none") => 0,
+        Some("2d") => 2,
         _ => 3,
     };
-    let least = if points.iter().any(|point| dimensions(point) == 3) { 3 } else { 2 };
+    let least = if points.iter().any(|&point| dimensions(point) == 3) { 3 } else { 2 };
     let flown: Vec<Node<'a, 'b>> =
-        points.iter().filter(|point| dimensions(point) >= least).copied().collect();
-    let mut warn = |text: String| notes.push(Note { is_warning: true, text });
+        points.iter().copied().filter(|&point| dimensions(point) >= least).collect();
     if flown.len() < points.len() {
-        warn(format!(
+        notes.push(Note::warning(format!(
             "{} of {} track points have no {}fix (`fix`), and are left out",
             points.len() - flown.len(),
             points.len(),
             if least == 3 { "3D " } else { "" }
-        ));
+        )));
     }
     if least == 2 && !flown.is_empty() {
-        warn("all fixes are 2d: receivers guess the heights then, check them".to_owned());
+        notes.push(Note::warning("all fixes are 2d: receivers guess the heights then, check them"));
     }
     flown
 }
 
 /// Text of the child element `name` of a track point.
-fn child(point: &Node<'_, '_>, name: &str) -> Option<String> {
-    let element = point.children().find(|node| node.has_local_name(name))?;
-    element.text().map(|text| text.trim().to_owned())
+fn child<'a>(point: Node<'a, '_>, name: &'static str) -> Option<&'a str> {
+    children(point, name).next()?.text().map(str::trim)
 }
 
 /// Parses one track point.
-fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, FlightLogError> {
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    let not_a_number = |name: &str, text: &str| FlightLogError::Header {
-        path: path.to_owned(),
-        line,
-        problem: format!("`{text}` of {name} is not a number"),
-    };
+fn raw_row(point: Node<'_, '_>) -> Result<RawRow, String> {
+    let line = line(point);
     let number = |name: &str, text: Option<&str>| match text.map(str::trim) {
         None | Some("") => Ok(f64::NAN),
-        Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
+        Some(text) => {
+            text.parse::<f64>().map_err(|_| format!("line {line}: `{text}` of {name} is not a number"))
+        }
     };
-    let (latitude, longitude) =
-        (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
-    if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
-        return Err(problem(format!("line {line}: latitude {latitude}, longitude {longitude} is no place")));
-    }
-    let height_m = number("ele", child(point, "ele").as_deref())?
-        * metres(point).map_err(|text| {
-            problem(format!(
-                "line {line}: {text}: GPX has metres; write the unit as m or ft, or convert the heights"
-            ))
-        })?;
-    let t_ns = match child(point, "time") {
-        None => None,
-        Some(text) => Some(time_fields::date_time_ns(&text).ok_or_else(|| {
-            problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z"))
-        })?),
-    };
+    let latitude = number("lat", point.attribute("lat"))?;
+    let longitude = number("lon", point.attribute("lon"))?;
+    xml::check_place(latitude, longitude, line)?;
+    let metres = metres(point).map_err(|text| {
+        format!("line {line}: {text}: GPX has metres; write the unit as m or ft, or convert the heights")
+    });
+    let height_m = number("ele", child(point, "ele"))? * metres?;
+    let t_ns = child(point, "time").map(|text| xml::time_ns(text, line)).transpose()?;
     Ok(RawRow {
         line,
         t_ns: t_ns.and_then(|ns| i64::try_from(ns).ok()),
@@ -148,8 +118,8 @@ fn raw_row(path: &Path, point: &Node<'_, '_>, line: usize) -> Result<RawRow, Fli
 ///
 /// # Errors
 /// The unit is none of length.
-fn metres(point: &Node<'_, '_>) -> Result<f64, String> {
-    let element = point.children().find(|node| node.has_local_name("ele"));
+fn metres(point: Node<'_, '_>) -> Result<f64, String> {
+    let element = children(point, "ele").next();
     let unit =
         element.and_then(|element| ["unit", "units", "uom"].iter().find_map(|name| element.attribute(*name)));
     let Some(unit) = unit else { return Ok(1.0) };
@@ -166,20 +136,14 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
     if spec.height == HeightReference::Ellipsoid {
         let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set \
             flight.height = \"msl\" unless you know better";
-        notes.push(Note { is_warning: true, text: text.to_owned() });
+        notes.push(Note::warning(text));
     }
     if spec.time_unit != TimeUnit::Auto {
-        notes.push(Note {
-            is_warning: true,
-            text: "flight.time_unit is not used: the times of GPX are dates".to_owned(),
-        });
+        notes.push(Note::warning("flight.time_unit is not used: the times of GPX are dates"));
     }
     let used = ["ele", "time", "fix", "trkpt", "trk", "trkseg", "gpx"];
     let in_points = points.iter().flat_map(|point| point.descendants());
-    let waypoints = document
-        .root_element()
-        .children()
-        .filter(|node| node.has_local_name("wpt") || node.has_local_name("rte"));
+    let waypoints = ["wpt", "rte"].into_iter().flat_map(|name| children(document.root_element(), name));
     let not_used: BTreeSet<&str> = in_points
         .chain(waypoints)
         .filter(|node| node.is_element())
@@ -197,15 +161,4 @@ fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) ->
         });
     }
     notes
-}
-
-trait LocalName {
-    /// Whether this is an element of the given name in any namespace: GPX 1.0, 1.1, or none.
-    fn has_local_name(&self, name: &str) -> bool;
-}
-
-impl LocalName for Node<'_, '_> {
-    fn has_local_name(&self, name: &str) -> bool {
-        self.is_element() && self.tag_name().name() == name
-    }
 }

@@ -1,9 +1,13 @@
 //! Header lines: the meaning and unit of each name, and lookup of columns by meaning.
 
+use camsim_core::{flight_log::Note, scenario::HeightReference};
+
 use super::{
     column_meaning::ColumnMeaning,
-    column_names, message_columns, split_stamps,
-    units::{Dimension, Qualifier, Unit, VerticalDatum, parse_qualifier},
+    column_names,
+    columns::FieldSource,
+    message_columns, split_stamps,
+    units::{Qualifier, Unit, parse_qualifier},
 };
 
 /// A column of a header.
@@ -70,12 +74,25 @@ impl HeaderColumns {
         self.0.iter().enumerate().filter(|(_, column)| fulfils(column)).map(|(index, _)| index).collect()
     }
 
+    /// Indices of the columns of a meaning.
+    pub(super) fn columns(&self, meaning: ColumnMeaning) -> Vec<usize> {
+        self.columns_where(|other| other == meaning)
+    }
+
+    pub(super) fn has(&self, meaning: ColumnMeaning) -> bool {
+        self.has_any(|other| other == meaning)
+    }
+
+    pub(super) fn has_any(&self, condition: impl Fn(ColumnMeaning) -> bool) -> bool {
+        self.0.iter().any(|column| column.parsed.as_ref().is_some_and(|parsed| condition(parsed.meaning)))
+    }
+
     /// The column of this meaning, if there is one.
     ///
     /// # Errors
     /// There are several, or its unit makes no sense: the error message.
     pub(super) fn unique(&self, meaning: ColumnMeaning) -> Result<Option<usize>, String> {
-        let all = self.columns_where(|other| other == meaning);
+        let all = self.columns(meaning);
         match all[..] {
             [] => Ok(None),
             [column] => self.check_usable(column).map(|()| Some(column)),
@@ -91,7 +108,7 @@ impl HeaderColumns {
         &self,
         meanings: [ColumnMeaning; N],
     ) -> Result<Option<[usize; N]>, String> {
-        if meanings.iter().any(|&meaning| self.columns_where(|other| other == meaning).is_empty()) {
+        if !meanings.iter().all(|&meaning| self.has(meaning)) {
             return Ok(None);
         }
         let mut columns = [0; N];
@@ -124,24 +141,30 @@ impl HeaderColumns {
         named.join(" and ")
     }
 
+    /// Note that one of several columns of a quantity counts.
+    pub(super) fn choice_note(&self, quantity: &str, columns: &[usize], chosen: usize) -> Note {
+        Note::information(format!(
+            "of the {quantity} {} `{}` counts",
+            self.describe(columns),
+            self.name(chosen)
+        ))
+    }
+
+    /// Columns whose name, in lower case, fulfils a condition.
+    pub(super) fn columns_by_name(&self, condition: impl Fn(&str) -> bool) -> Vec<usize> {
+        (0..self.0.len())
+            .filter(|&column| condition(&self.name(column).trim_matches(['"', ' ']).to_lowercase()))
+            .collect()
+    }
+
+    /// The field of a column, with its unit.
+    pub(super) fn source(&self, column: usize) -> FieldSource {
+        FieldSource::whole(column, self.factor(column))
+    }
+
     /// Factor of a column's unit, if the header states one.
     pub(super) fn factor(&self, column: usize) -> Option<f64> {
         self.parsed(column).and_then(|parsed| parsed.unit).map(|unit| unit.factor)
-    }
-}
-
-/// The physical dimension of a column; `None` where it has no unit.
-pub(super) fn dimension(meaning: ColumnMeaning) -> Option<Dimension> {
-    use ColumnMeaning::*;
-    match meaning {
-        Time | NanosecondsPart => Some(Dimension::Time),
-        Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => {
-            Some(Dimension::Angle)
-        }
-        Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid | EarthCentred
-        | X | Y | Z => Some(Dimension::Length),
-        DateTime | Date | Hemisphere | TimePart | Vehicle | Receiver | InUse | Fix(_) | HeightDatum | Qx
-        | Qy | Qz | Qw => None,
     }
 }
 
@@ -177,8 +200,8 @@ pub(super) fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedNa
     let mut unit = known.unit;
     for qualifier in qualifiers {
         match qualifier {
-            Qualifier::Unit(other) if dimension(meaning) != Some(other.dimension) => {
-                problem = Some(match dimension(meaning) {
+            Qualifier::Unit(other) if meaning.dimension() != Some(other.dimension) => {
+                problem = Some(match meaning.dimension() {
                     Some(dimension) => format!("{} is no unit of {}", other.name, dimension.name()),
                     None => format!("it has no unit, but {} is named", other.name),
                 });
@@ -196,7 +219,7 @@ pub(super) fn parse_name(name: &str, unit_line: Option<&str>) -> Option<ParsedNa
                 ColumnMeaning::Height(Some(other)) if other != datum => {
                     problem = Some("it names two vertical datums".to_owned())
                 }
-                ColumnMeaning::PressureHeight if datum == VerticalDatum::Ellipsoid => {
+                ColumnMeaning::PressureHeight if datum == HeightReference::Ellipsoid => {
                     problem = Some("a height by air pressure is not above the ellipsoid".to_owned())
                 }
                 _ => {}
@@ -246,7 +269,7 @@ fn split_brackets(name: &str) -> (String, Vec<String>) {
 fn join_bracketed_quantity(bare: &mut String, inside: &mut Vec<String>) {
     let Some(first) = inside.first().filter(|text| parse_qualifiers(text).is_none()) else { return };
     let is_instrument =
-        column_names::PREFIXES.iter().any(|prefix| prefix.trim_end_matches('_') == normal_form(bare));
+        column_names::PREFIXES.split(' ').any(|prefix| prefix.trim_end_matches('_') == normal_form(bare));
     if is_instrument {
         *bare = format!("{} {first}", bare.trim_end());
         inside.remove(0);
@@ -298,7 +321,7 @@ fn split_suffixes(normal: &str) -> Option<(&'static column_names::KnownName, Str
         if let Some(known) = column_names::find(stem) {
             // `alt_min` is the minimum of a height, not a height in minutes: another, unknown name.
             let fits = |qualifier: &Qualifier| match qualifier {
-                Qualifier::Unit(unit) => dimension(known.meaning) == Some(unit.dimension),
+                Qualifier::Unit(unit) => known.meaning.dimension() == Some(unit.dimension),
                 _ => true,
             };
             return qualifiers.iter().all(fits).then(|| (known, stem.to_owned(), qualifiers));
@@ -333,7 +356,7 @@ mod tests {
     #[test]
     fn names_are_parsed_into_meaning_unit_and_datum() {
         use ColumnMeaning::*;
-        let mean_sea_level = Height(Some(VerticalDatum::MeanSeaLevel));
+        let mean_sea_level = Height(Some(HeightReference::Msl));
         for (name, meaning, unit) in [
             ("time(millisecond)", Time, "ms"),
             ("TimeUS", Time, "us"),
@@ -357,7 +380,7 @@ mod tests {
             ("h_mm", Height(None), "mm"),
             ("gnss_alt_m", Height(None), "m"),
             ("altitude in feet", Height(None), "ft"),
-            ("HAE (m)", Height(Some(VerticalDatum::Ellipsoid)), "m"),
+            ("HAE (m)", Height(Some(HeightReference::Ellipsoid)), "m"),
             ("Yaw(rad)", Yaw, "rad"),
             ("yaw_cdeg", Yaw, "cdeg"),
             ("heading (deg, magnetic)", MagneticYaw, "deg"),
@@ -376,7 +399,7 @@ mod tests {
         for (name, meaning) in [
             ("timestamp(s)", Time),
             ("q_RS_w []", Qw),
-            ("alt_ellipsoid", Height(Some(VerticalDatum::Ellipsoid))),
+            ("alt_ellipsoid", Height(Some(HeightReference::Ellipsoid))),
             ("datetime(utc)", DateTime),
             ("GPSLatitude", Latitude),
             ("SubSecDateTimeOriginal", DateTime),

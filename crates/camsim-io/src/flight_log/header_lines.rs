@@ -1,17 +1,13 @@
 //! Which of the lines above the rows name the columns, which state their units, and which are prose.
 
-use std::path::Path;
-
 use camsim_core::{
     flight_log::Note,
     scenario::{FlightSpec, LogFormat},
 };
 
 use super::{
-    FlightLogError,
     column_meaning::ColumnMeaning,
-    column_selection::{has_time_and_position, push_information, push_warning},
-    header::{HeaderColumn, HeaderColumns, ParsedName, dimension, parse_name, parse_qualifiers},
+    header::{HeaderColumn, HeaderColumns, ParsedName, parse_name, parse_qualifiers},
     missing_columns::missing_columns_message,
     text_table::{HeaderLine, Table, is_missing},
     time_fields,
@@ -38,25 +34,21 @@ impl<'a> HeaderLines<'a> {
     ///
     /// # Errors
     /// A line that is no comment does not fit, or two lines contradict each other.
-    pub(super) fn sort(
-        path: &Path,
-        table: &Table<'a>,
-        spec: &FlightSpec,
-        notes: &mut Vec<Note>,
-    ) -> Result<Self, FlightLogError> {
-        let fail = |line: usize, problem: String| {
-            Err(FlightLogError::Header { path: path.to_owned(), line, problem })
-        };
+    pub(super) fn sort(table: &Table<'a>, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<Self, String> {
         let complete = table.headers.iter().enumerate().rev().find_map(|(index, line)| {
             Some((index, complete_names(table, line)?)).filter(|(_, header)| {
                 // A comment of another width may still be prose about the columns.
                 !line.is_comment || table.fits(header.0.len())
             })
         });
-        let Some((index, header)) = complete else { return Self::without_names(path, table, spec, notes) };
+        let Some((index, header)) = complete else { return Self::without_names(table, spec, notes) };
         let names_line = table.headers[index];
         if !table.fits(header.0.len()) {
-            return fail(names_line.number, width_message(&table.names(names_line.text), table));
+            return Err(format!(
+                "line {}: {}",
+                names_line.number,
+                width_message(&table.names(names_line.text), table)
+            ));
         }
         let mut header = header;
         let mut prose = Vec::new();
@@ -64,28 +56,23 @@ impl<'a> HeaderLines<'a> {
             if let Some(cells) = unit_cells(&header, table, line.text) {
                 add_units(&mut header, &cells);
                 let text = format!("line {} states the units of the columns", line.number);
-                push_information(notes, text);
+                notes.push(Note::information(text));
             } else if let Some(second) = second_names(&header, table, line) {
                 merge(&mut header, &second, [line.number, names_line.number]);
                 let text = format!("lines {} and {} both name the columns", line.number, names_line.number);
-                push_information(notes, text);
+                notes.push(Note::information(text));
             } else if line.is_comment || other < index {
                 prose.push(*line);
             } else {
                 let below = HeaderColumns::parse(&table.names(line.text));
-                return fail(line.number, below_message(&below, names_line.number));
+                return Err(format!("line {}: {}", line.number, below_message(&below, names_line.number)));
             }
         }
         Ok(Self { names: Some((names_line.number, header)), misfit: None, prose })
     }
 
     /// The lines of a table none of which names a time and a position.
-    fn without_names(
-        path: &Path,
-        table: &Table<'a>,
-        spec: &FlightSpec,
-        notes: &mut Vec<Note>,
-    ) -> Result<Self, FlightLogError> {
+    fn without_names(table: &Table<'a>, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<Self, String> {
         let parsed = |line: &HeaderLine<'a>| HeaderColumns::parse(&table.names(line.text));
         let must_be_names = table.headers.iter().filter(|line| !line.is_comment);
         let best = must_be_names.max_by_key(|line| known_names(&parsed(line)));
@@ -98,15 +85,15 @@ impl<'a> HeaderLines<'a> {
             })
         };
         if let Some(line) = best.or_else(fitting_comment) {
-            let problem = missing_columns_message(&parsed(line));
+            let problem = format!("line {}: {}", line.number, missing_columns_message(&parsed(line)));
             if !line.is_comment || spec.format == LogFormat::Auto {
-                return Err(FlightLogError::Header { path: path.to_owned(), line: line.number, problem });
+                return Err(problem);
             }
-            push_warning(notes, format!("line {}: {problem}; flight.format counts", line.number));
+            notes.push(Note::warning(format!("{problem}; flight.format counts")));
         }
         let misfit = table.headers.iter().rev().find_map(|line| {
             let names = without_words_before(table.names(line.text));
-            has_time_and_position(&HeaderColumns::parse(&names)).then_some((line.number, names))
+            HeaderColumns::parse(&names).has_time_and_position().then_some((line.number, names))
         });
         Ok(Self { names: None, misfit, prose: table.headers.clone() })
     }
@@ -147,7 +134,7 @@ fn below_message(below: &HeaderColumns, names_line: usize) -> String {
 /// The columns that a line names, if they include a time and a position.
 fn complete_names(table: &Table<'_>, line: &HeaderLine<'_>) -> Option<HeaderColumns> {
     let header = HeaderColumns::parse(&names_of_columns(table, line.text));
-    if has_time_and_position(&header) && (table.fits(header.0.len()) || !line.is_comment) {
+    if header.has_time_and_position() && (table.fits(header.0.len()) || !line.is_comment) {
         return Some(header);
     }
     if line.is_comment { header_after_prose(table, line.text) } else { None }
@@ -191,7 +178,7 @@ fn names_of_columns<'a>(table: &Table<'a>, text: &'a str) -> Vec<&'a str> {
 fn header_after_prose(table: &Table<'_>, text: &str) -> Option<HeaderColumns> {
     let after_mark = text.match_indices([':', '=']).map(|(mark, _)| &text[mark + 1..]);
     let mut headers = after_mark.map(|text| HeaderColumns::parse(&table.names(text.trim())));
-    let fits = |header: &HeaderColumns| table.fits(header.0.len()) && has_time_and_position(header);
+    let fits = |header: &HeaderColumns| table.fits(header.0.len()) && header.has_time_and_position();
     headers.find(fits).or_else(|| {
         let names = table.names(text);
         let prose_words = names.len().checked_sub(table.columns)?;
@@ -221,7 +208,7 @@ fn unit_cells<'a>(header: &HeaderColumns, table: &Table<'a>, text: &'a str) -> O
     let (mut units, mut others) = (0, 0);
     for (column, cell) in cells.iter().enumerate().filter(|(_, cell)| !is_missing(cell)) {
         let bare = cell.trim_matches(['[', ']', '(', ')', '"', ' ']);
-        let wanted = header.parsed(column).map(|parsed| dimension(parsed.meaning));
+        let wanted = header.parsed(column).map(|parsed| parsed.meaning.dimension());
         let unit_of = |qualifiers: Vec<Qualifier>| {
             qualifiers.into_iter().find_map(|qualifier| match qualifier {
                 Qualifier::Unit(unit) => Some(unit.dimension),
@@ -244,12 +231,12 @@ fn cells_of_columns_with_units<'a>(
     text: &'a str,
 ) -> Option<Vec<&'a str>> {
     let has_unit =
-        |column: usize| header.parsed(column).is_some_and(|parsed| dimension(parsed.meaning).is_some());
+        |column: usize| header.parsed(column).is_some_and(|parsed| parsed.meaning.dimension().is_some());
     let columns: Vec<usize> = (0..header.0.len()).filter(|&column| has_unit(column)).collect();
     let units = table.cells(text, columns.len())?;
     let mut cells = vec![""; header.0.len()];
     for (column, unit) in columns.into_iter().zip(units) {
-        let wanted = header.parsed(column).and_then(|parsed| dimension(parsed.meaning));
+        let wanted = header.parsed(column).and_then(|parsed| parsed.meaning.dimension());
         let bare = unit.trim_matches(['[', ']', '(', ')', '"', ' ']);
         let found = parse_qualifiers(bare)?.into_iter().find_map(|qualifier| match qualifier {
             Qualifier::Unit(unit) => Some(unit.dimension),
@@ -278,7 +265,7 @@ fn add_units(header: &mut HeaderColumns, cells: &[&str]) {
     for (column, cell) in header.0.iter_mut().zip(cells).filter(|(_, cell)| !is_missing(cell)) {
         let Some(parsed) = &column.parsed else { continue };
         // Dates and words such as `quaternion` have no unit.
-        if dimension(parsed.meaning).is_some()
+        if parsed.meaning.dimension().is_some()
             && let Some(with_unit) = parse_name(&column.name, Some(cell))
         {
             column.parsed = Some(with_unit);

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use camsim_core::flight_log::Note;
 
-use super::{column_selection::push_warning, rows::ParsedRow, sparse_rows, time_unit::format_short};
+use super::{rows::ParsedRow, sparse_rows, time_unit::format_short};
 use crate::median::median;
 
 /// With fewer steps of the position than this it is not known whether they are regular.
@@ -14,17 +14,21 @@ const MAX_PERIOD_NS: i128 = 1_100_000_000;
 
 /// Interpolates positions that stay the same for a regular number of rows, between the rows where they
 /// change. A platform that stands still keeps its rows.
-pub(super) fn interpolate_held(rows: &mut Vec<ParsedRow>, is_geodetic: bool, notes: &mut Vec<Note>) {
+pub(super) fn interpolated(
+    mut rows: Vec<ParsedRow>,
+    is_geodetic: bool,
+    notes: &mut Vec<Note>,
+) -> Vec<ParsedRow> {
     let timed: Vec<usize> =
         (0..rows.len()).filter(|&row| rows[row].time.is_some() && rows[row].has_position()).collect();
-    let runs = runs(rows, &timed);
-    let Some(period) = regular_length(&runs) else { return };
+    let runs = runs(&rows, &timed);
+    let Some(period) = regular_length(&runs) else { return rows };
     let time = |row: usize| rows[timed[row]].time.unwrap_or_default();
     let is_sorted = (1..timed.len()).all(|row| time(row - 1) < time(row));
     let mut steps_ns: Vec<i128> = runs.windows(2).map(|pair| time(pair[1].0) - time(pair[0].0)).collect();
     let period_ns = median(&mut steps_ns, Ord::cmp).unwrap_or(0);
-    if !is_sorted || period_ns > MAX_PERIOD_NS || !attitudes_change(rows, &timed, &runs) {
-        return;
+    if !is_sorted || period_ns > MAX_PERIOD_NS || !attitudes_change(&rows, &timed, &runs) {
+        return rows;
     }
     let is_held = |&(start, length): &(usize, usize)| {
         let heights = timed[start..start + length].iter().map(|&row| rows[row].position[2]);
@@ -36,7 +40,7 @@ pub(super) fn interpolate_held(rows: &mut Vec<ParsedRow>, is_geodetic: bool, not
     let held: HashSet<usize> =
         timed.iter().map(|&row| rows[row].line).filter(|line| !known.contains(line)).collect();
     sparse_rows::interpolate(
-        rows,
+        &mut rows,
         axes,
         is_geodetic,
         &|row: &ParsedRow| known.contains(&row.line),
@@ -54,7 +58,8 @@ pub(super) fn interpolate_held(rows: &mut Vec<ParsedRow>, is_geodetic: bool, not
     if left_out > 0 {
         text += &format!(", and {left_out} rows beyond the first or last change are left out");
     }
-    push_warning(notes, text);
+    notes.push(Note::warning(text));
+    rows
 }
 
 /// Runs of equal horizontal positions: start and length, in `timed`.
@@ -120,8 +125,8 @@ mod tests {
     }
 
     fn interpolated(norths: impl Iterator<Item = usize>) -> (Vec<f64>, usize) {
-        let (mut rows, mut notes) = (rows(norths), Vec::new());
-        interpolate_held(&mut rows, false, &mut notes);
+        let mut notes = Vec::new();
+        let rows = super::interpolated(rows(norths), false, &mut notes);
         (rows.iter().map(|row| row.position[0]).collect(), notes.len())
     }
 

@@ -10,15 +10,13 @@
 //! pressure are of the standard atmosphere, not above any datum. A fix without height (`V`) is left out where
 //! others have one.
 
-use std::path::Path;
-
 use camsim_core::{
     flight_log::Note,
-    scenario::{FlightSpec, HeightSource, LogFormat},
+    scenario::{FlightSpec, HeightSource},
 };
 
 use super::{
-    FlightLogError, RawLog,
+    RawLog,
     columns::{AttitudeKind, Frame},
     streams::{self, Stream, Streams},
     unused_keys::unused_topic_note,
@@ -26,7 +24,7 @@ use super::{
 
 mod header;
 
-use header::{GnssHeight, Header};
+use header::Header;
 
 const SECOND_NS: i128 = 1_000_000_000;
 const DAY_NS: i128 = 86_400 * SECOND_NS;
@@ -78,43 +76,38 @@ pub(super) fn is_igc(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// There are no fixes, or one is damaged.
-pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    streams::check_format(path, spec, LogFormat::Igc)?;
-    let bad_line =
-        |line: usize, problem: String| FlightLogError::Header { path: path.to_owned(), line, problem };
+pub(super) fn read(text: &str, spec: &FlightSpec) -> Result<RawLog, String> {
     let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().collect();
     let (mut fixes, mut extensions, mut header) =
         (Vec::<Fix>::new(), Extensions::default(), Header::default());
     for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line_number = index + 1;
+        let bad_line = |problem: String| format!("line {line_number}: {problem}");
         let line = line.trim();
         if line.starts_with('I') {
             extensions = Extensions::parse(line);
         } else if line.starts_with('B') {
-            let fix =
-                Fix::parse(line, line_number, &extensions).map_err(|text| bad_line(line_number, text))?;
+            let fix = Fix::parse(line, line_number, &extensions).map_err(bad_line)?;
             fixes.push(Fix { day_ns: header.day_ns.unwrap_or(0), ..fix });
         } else {
-            header.read(line, line_number).map_err(|text| bad_line(line_number, text))?;
+            header.read(line, line_number).map_err(bad_line)?;
         }
     }
     if fixes.is_empty() {
-        return Err(problem("the IGC file has no fixes (B records): it is no record of a flight".to_owned()));
+        return Err("the IGC file has no fixes (B records): it is no record of a flight".to_owned());
     }
     notes.append(&mut header.notes);
     unroll_midnight(&mut fixes, &mut notes);
-    let uses_gnss = chooses_gnss(&fixes, spec, &mut notes).map_err(problem)?;
-    if uses_gnss && header.gnss_height != GnssHeight::Unknown {
-        let is_msl = header.gnss_height == GnssHeight::MeanSeaLevel;
-        notes.extend(streams::height_note("GNSS heights of the IGC file", is_msl, spec));
+    let uses_gnss = chooses_gnss(&fixes, spec, &mut notes)?;
+    if let Some(datum) = header.gnss_height.filter(|_| uses_gnss) {
+        notes.extend(streams::height_note("GNSS heights of the IGC file", datum, spec));
     }
     if let Some((number, text)) = header.pressure.filter(|_| !uses_gnss) {
         let text = format!(
             "line {number}: `{text}` sets the pressure heights otherwise than the standard atmosphere: they are \
                 taken as they stand"
         );
-        notes.push(Note { is_warning: true, text });
+        notes.push(Note::warning(text));
     }
     let count = fixes.len();
     if uses_gnss && fixes.iter().any(|fix| fix.is_3d) {
@@ -123,7 +116,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     if fixes.len() < count {
         let text =
             format!("{} of {count} fixes have no GNSS height (V), and are left out", count - fixes.len());
-        notes.push(Note { is_warning: true, text });
+        notes.push(Note::warning(text));
     }
     let rows = fixes.iter().map(|fix| {
         let mut row = streams::empty_row(fix.line, Some(fix.time_ns));
@@ -133,7 +126,7 @@ pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog,
     });
     let position = Stream { name: "B".to_owned(), rows: rows.collect() };
     Streams { frame: Frame::Geodetic, kind: AttitudeKind::None, position, attitude: None, notes }
-        .into_log(path, spec)
+        .into_log(spec)
 }
 
 /// Whether heights are those of satellite navigation.
@@ -151,13 +144,10 @@ fn chooses_gnss(fixes: &[Fix], spec: &FlightSpec, notes: &mut Vec<Note>) -> Resu
         HeightSource::Gnss => Ok(true),
         HeightSource::Pressure | HeightSource::Auto => {
             let reason = if spec.height_from == HeightSource::Auto { "all GNSS heights are 0: " } else { "" };
-            notes.push(Note {
-                is_warning: true,
-                text: format!(
-                    "{reason}the heights are those of air pressure in the standard atmosphere, which may be \
+            notes.push(Note::warning(format!(
+                "{reason}the heights are those of air pressure in the standard atmosphere, which may be \
                         off by 100 m and more"
-                ),
-            });
+            )));
             Ok(false)
         }
     }
@@ -174,7 +164,7 @@ fn unroll_midnight(fixes: &mut [Fix], notes: &mut Vec<Note>) {
                 offset_ns += DAY_NS;
                 let text =
                     format!("the clock passes midnight at line {}: the times go on from there", fix.line);
-                notes.push(Note { is_warning: false, text });
+                notes.push(Note::information(text));
             }
             _ => {}
         }

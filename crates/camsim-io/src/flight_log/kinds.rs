@@ -4,7 +4,7 @@ use std::path::Path;
 
 use camsim_core::scenario::{FlightSpec, LogFormat};
 
-use super::{FlightLogError, RawLog, columns::format_name, dataflash, igc, mcap_file, ulog};
+use super::{LogProblem, RawLog, dataflash, igc, mcap_file, streams, ulog};
 
 /// The format of a binary log or flight record; `None` for tables, XML and formats that are not read.
 ///
@@ -41,24 +41,17 @@ pub(super) fn detect(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Option<Log
 ///
 /// # Errors
 /// The file is empty, or as the reader of its format says.
-pub(super) fn read(
-    format: LogFormat,
-    path: &Path,
-    bytes: &[u8],
-    spec: &FlightSpec,
-) -> Result<RawLog, FlightLogError> {
+pub(super) fn read(format: LogFormat, bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, LogProblem> {
     if bytes.is_empty() {
-        return Err(FlightLogError::Empty { path: path.to_owned() });
+        return Err(LogProblem::Empty);
     }
-    match format {
-        LogFormat::Ulog => ulog::read(path, bytes, spec),
-        LogFormat::Dataflash => dataflash::read(path, bytes, spec),
-        LogFormat::Mcap => mcap_file::read(path, bytes, spec),
+    streams::check_format(spec, format)?;
+    Ok(match format {
+        LogFormat::Ulog => ulog::read(bytes, spec),
+        LogFormat::Dataflash => dataflash::read(bytes, spec),
+        LogFormat::Mcap => mcap_file::read(bytes, spec),
         // Names of pilots may be in any encoding.
-        LogFormat::Igc => igc::read(path, &String::from_utf8_lossy(bytes), spec),
-        other => Err(FlightLogError::Values {
-            path: path.to_owned(),
-            problem: format!("{} is not read as a binary log", format_name(other)),
-        }),
-    }
+        LogFormat::Igc => igc::read(&String::from_utf8_lossy(bytes), spec),
+        other => Err(format!("{} is not read as a binary log", other.name())),
+    }?)
 }

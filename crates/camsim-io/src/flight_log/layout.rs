@@ -1,23 +1,24 @@
 //! The meaning of each column of a table: from its header, else from `flight.format`, else from the values.
 
-use std::path::Path;
-
 use camsim_core::{
     flight_log::Note,
     scenario::{AttitudeSource, FlightSpec, LogFormat},
 };
 
 use super::{
-    FlightLogError,
     attitude_columns::attitude_columns,
     column_meaning::{ColumnMeaning, FixCode},
-    column_selection::{note_unused_columns, position_columns, push_warning, time_columns},
     columns::{AttitudeColumns, AttitudeKind, FieldSource, Frame, TimeColumns},
     detect,
+    error::LogProblem,
     header::HeaderColumns,
     header_lines::{HeaderLines, width_message},
-    height_datum, statements,
+    height_datum,
+    position_columns::position_columns,
+    statements,
     text_table::Table,
+    time_columns::time_columns,
+    unused_columns::note_unused_columns,
 };
 
 /// The meaning of the columns of a table.
@@ -43,19 +44,18 @@ pub(super) struct TableLayout {
 
 impl TableLayout {
     pub(super) fn detect(
-        path: &Path,
         table: &Table<'_>,
         spec: &FlightSpec,
         notes: &mut Vec<Note>,
-    ) -> Result<Self, FlightLogError> {
-        detect::refuse_pose_matrices(path, table)?;
-        let mut header_lines = HeaderLines::sort(path, table, spec, notes)?;
+    ) -> Result<Self, LogProblem> {
+        detect::refuse_pose_matrices(table)?;
+        let mut header_lines = HeaderLines::sort(table, spec, notes)?;
         let mut layout = match (&header_lines.names, &header_lines.misfit) {
             (Some((line, header)), _) => Self::from_header(header, table, spec, notes)
-                .map_err(|problem| FlightLogError::Header { path: path.to_owned(), line: *line, problem })?,
+                .map_err(|problem| format!("line {line}: {problem}"))?,
             (None, misfit) => {
                 let misfit = misfit.as_ref().map(|(line, names)| (*line, &names[..]));
-                Self::without_names(path, table, spec, misfit, notes)?
+                Self::without_names(table, spec, misfit, notes)?
             }
         };
         // The comment that is read in full.
@@ -71,14 +71,13 @@ impl TableLayout {
     /// The layout of a table without names, by flight.format or by the values. `misfit` are names of a comment
     /// that are not as many as the columns: those of the first columns must mean the same.
     fn without_names(
-        path: &Path,
         table: &Table<'_>,
         spec: &FlightSpec,
         misfit: Option<(usize, &[&str])>,
         notes: &mut Vec<Note>,
-    ) -> Result<Self, FlightLogError> {
+    ) -> Result<Self, LogProblem> {
         let detected = match spec.format {
-            LogFormat::Auto => detect::detect_format(path, table, spec),
+            LogFormat::Auto => detect::detect_format(table, spec),
             format => Ok(format),
         };
         let Some((line, names)) = misfit else {
@@ -103,22 +102,15 @@ impl TableLayout {
                     layout.position = named.position;
                     layout.attitude = named.attitude;
                 }
-                push_warning(
-                    notes,
-                    format!(
-                        "line {line} names {} columns, but the rows have {}: they are read as {}",
-                        names.len(),
-                        table.columns,
-                        layout.names.join(", ")
-                    ),
-                );
+                notes.push(Note::warning(format!(
+                    "line {line} names {} columns, but the rows have {}: they are read as {}",
+                    names.len(),
+                    table.columns,
+                    layout.names.join(", ")
+                )));
                 Ok(layout)
             }
-            _ => Err(FlightLogError::Header {
-                path: path.to_owned(),
-                line,
-                problem: width_message(names, table),
-            }),
+            _ => Err(format!("line {line}: {}", width_message(names, table)).into()),
         }
     }
 
@@ -153,14 +145,7 @@ impl TableLayout {
         };
         Self {
             format,
-            time: TimeColumns {
-                column: 0,
-                unit_ns: None,
-                integers_are_ns: format == LogFormat::Euroc,
-                date: None,
-                week: None,
-                nanoseconds: None,
-            },
+            time: TimeColumns { integers_are_ns: format == LogFormat::Euroc, ..TimeColumns::default() },
             frame,
             position: [1, 2, 3].map(|column| FieldSource::whole(column, None)),
             attitude,
@@ -204,7 +189,7 @@ impl TableLayout {
         note_unused_columns(header, frame, attitude, notes);
         height_datum::check(header, table, position[2].column, frame, spec, notes);
         let names = header.0.iter().map(|column| column.name.clone()).collect();
-        let first = |meaning: ColumnMeaning| header.columns_where(|other| other == meaning).first().copied();
+        let first = |meaning| header.columns(meaning).first().copied();
         let fixes = (0..header.0.len()).filter_map(|column| match header.parsed(column)?.meaning {
             ColumnMeaning::Fix(code) => Some((column, code)),
             _ => None,
@@ -226,13 +211,14 @@ impl TableLayout {
 
     /// Number of columns that a row must have.
     pub(super) fn required_columns(&self) -> usize {
-        let attitude = match self.attitude {
-            AttitudeColumns::None => 0,
-            AttitudeColumns::Euler(sources) => sources.iter().map(|source| source.column).max().unwrap_or(0),
-            AttitudeColumns::Quaternion(columns) => columns.into_iter().max().unwrap_or(0),
-        };
+        let attitude = self.attitude.columns().into_iter().max().unwrap_or(0);
         let time = self.time.column.max(self.time.date.unwrap_or(0)).max(self.time.nanoseconds.unwrap_or(0));
         1 + self.position.iter().map(|source| source.column).fold(attitude.max(time), usize::max)
+    }
+
+    /// A column for messages: ``column 2 (`name`)``.
+    pub(super) fn describe(&self, column: usize) -> String {
+        format!("column {}{}", column + 1, self.bracketed_name(column))
     }
 
     /// Name of a column in brackets, with a blank before it, for messages: ` (`name`)`.

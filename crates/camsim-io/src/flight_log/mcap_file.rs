@@ -14,15 +14,15 @@
 //! headers, or the recorder's where those are 0. CDR and ROS 1 messages are read, whole or in chunks (zstd,
 //! lz4).
 
-use std::{collections::BTreeMap, path::Path};
+use std::collections::BTreeMap;
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{AttitudeSource, FlightSpec, LogFormat},
+    scenario::{AttitudeSource, FlightSpec, HeightReference},
 };
 
 use super::{
-    FlightLogError, RawLog,
+    RawLog,
     columns::{AttitudeKind, Frame},
     streams::{self, Stream, Streams},
     unused_keys::unused_height_note,
@@ -42,24 +42,22 @@ use tree::Tree;
 ///
 /// # Errors
 /// The file is no MCAP file, or no topic or several fit.
-pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    streams::check_format(path, spec, LogFormat::Mcap)?;
-    let mut topics = records::read(bytes).map_err(problem)?;
+pub(super) fn read(bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, String> {
+    let mut topics = records::read(bytes)?;
     let (position_name, attitude_name) = streams::named_topics(spec);
     let (key, kind) = choose(&topics, position_name, &|kind| kind.has_position(), "positions")
-        .map_err(|text| problem([&[text][..], &topics.damage].concat().join("; ")))?;
-    let mut notes: Vec<Note> = topics.damage.drain(..).map(|text| Note { is_warning: true, text }).collect();
+        .map_err(|text| [&[text][..], &topics.damage].concat().join("; "))?;
+    let mut notes: Vec<Note> = topics.damage.drain(..).map(Note::warning).collect();
     notes.extend(unused_height_note(spec));
-    let samples = turned(&topics, &key, kind, &mut notes).map_err(problem)?;
+    let samples = turned(&topics, &key, kind, &mut notes)?;
     let is_geodetic = kind == RosKind::NavSatFix;
     let imu = if !is_geodetic && attitude_name.is_none() || spec.attitude == AttitudeSource::Track {
         None
     } else {
-        choose_imu(&topics, attitude_name).map_err(problem)?
+        choose_imu(&topics, attitude_name)?
     };
     if is_geodetic {
-        notes.extend(streams::height_note("heights of NavSatFix", false, spec));
+        notes.extend(streams::height_note("heights of NavSatFix", HeightReference::Ellipsoid, spec));
     }
     let position = stream(&key, &samples, imu.is_none(), &mut notes);
     let attitude = match imu {
@@ -68,14 +66,14 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLo
         Some(other) if other == key => Some(stream(&key, &samples, true, &mut notes)),
         Some(other) => {
             let kind = topics.kinds.get(&other).copied().unwrap_or(RosKind::Imu);
-            let samples = turned(&topics, &other, kind, &mut notes).map_err(problem)?;
+            let samples = turned(&topics, &other, kind, &mut notes)?;
             Some(stream(&other, &samples, true, &mut notes))
         }
     };
     let has_attitude = attitude.is_some() || position.rows.iter().any(|row| row.has_attitude());
     let kind = if has_attitude { AttitudeKind::Quaternion } else { AttitudeKind::None };
     let frame = if is_geodetic { Frame::Geodetic } else { Frame::NorthEastDown };
-    Streams { frame, kind, position, attitude, notes }.into_log(path, spec)
+    Streams { frame, kind, position, attitude, notes }.into_log(spec)
 }
 
 /// The samples of a topic, in the root of their transforms and in camsim's axes.
@@ -195,14 +193,14 @@ fn stream(key: &TopicKey, samples: &[Sample], with_attitude: bool, notes: &mut V
     }
     if without_fix > 0 {
         let text = format!("{without_fix} messages of `{name}` have no fix, and are left out");
-        notes.push(Note { is_warning: true, text });
+        notes.push(Note::warning(text));
     }
     if without_stamp > 0 {
         let text = format!(
             "{without_stamp} headers of `{name}` have no stamp: their times are those of the recording, which \
                 are later and uneven"
         );
-        notes.push(Note { is_warning: true, text });
+        notes.push(Note::warning(text));
     }
     Stream { name, rows }
 }

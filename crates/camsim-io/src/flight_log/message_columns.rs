@@ -1,10 +1,12 @@
 //! Tables merged from messages, whose columns are named `MESSAGE.field`: MAVLink's and ArduPilot's as
 //! `mavlogdump.py --format csv` writes them. The message fixes units and datums.
 
+use camsim_core::scenario::HeightReference;
+
 use super::{
     column_meaning::{ColumnMeaning, FixCode},
     header::{HeaderColumn, ParsedName},
-    units::{DEGREE, DEGREE_E7, METRE, MICROSECOND, MILLIMETRE, MILLISECOND, RADIAN, Unit, VerticalDatum},
+    units::{DEGREE, DEGREE_E7, METRE, MICROSECOND, MILLIMETRE, MILLISECOND, RADIAN, Unit},
 };
 
 /// A field of a message with its meaning; a field that is not listed is not read.
@@ -16,8 +18,8 @@ struct Message {
     fields: &'static [Field],
 }
 
-const MSL: ColumnMeaning = ColumnMeaning::Height(Some(VerticalDatum::MeanSeaLevel));
-const ELLIPSOID: ColumnMeaning = ColumnMeaning::Height(Some(VerticalDatum::Ellipsoid));
+const MSL: ColumnMeaning = ColumnMeaning::Height(Some(HeightReference::Msl));
+const ELLIPSOID: ColumnMeaning = ColumnMeaning::Height(Some(HeightReference::Ellipsoid));
 const DEGREES: Option<&Unit> = Some(&DEGREE);
 const RADIANS: Option<&Unit> = Some(&RADIAN);
 const METRES: Option<&Unit> = Some(&METRE);
@@ -204,11 +206,13 @@ fn apply_one_message(columns: &mut [HeaderColumn]) {
 }
 
 /// Rows of docs/reference/inputs/LOGS.md: messages and the fields that are read, with their units.
-pub(super) fn documentation() -> Vec<(String, String)> {
+pub(super) fn documentation() -> impl Iterator<Item = [String; 2]> {
     let field = |(name, _, unit): &Field| match unit {
         Some(unit) => format!("{name} ({})", unit.name),
         None => (*name).to_owned(),
     };
-    let fields = |message: &Message| message.fields.iter().map(field).collect::<Vec<_>>().join(", ");
-    MESSAGES.iter().map(|message| (message.name.to_owned(), fields(message))).collect()
+    MESSAGES.iter().map(move |message| {
+        let fields: Vec<String> = message.fields.iter().map(field).collect();
+        [message.name.to_owned(), fields.join(", ")]
+    })
 }

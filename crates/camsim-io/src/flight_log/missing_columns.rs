@@ -1,21 +1,38 @@
 //! What a header lacks that no flight can be read without.
 
 use super::{
-    column_meaning::ColumnMeaning, column_selection::is_time, header::HeaderColumns,
-    height_column::is_height, unknown_unit::unknown_units,
+    column_meaning::ColumnMeaning::{
+        self, Date, Down, EarthCentred, East, Grid, Latitude, LatitudeLongitude, Longitude, North, X, Y, Z,
+    },
+    header::HeaderColumns,
+    unused_columns::unknown_units,
 };
 
 /// Unknown names that a message lists.
 const MAX_NAMES: usize = 8;
 
+impl HeaderColumns {
+    /// Whether the names include latitude and longitude.
+    pub(super) fn is_geodetic(&self) -> bool {
+        self.has(LatitudeLongitude) || (self.has(Latitude) && self.has(Longitude))
+    }
+
+    /// Whether the names include a time and a position, whatever else is wrong with them.
+    pub(super) fn has_time_and_position(&self) -> bool {
+        let has_plane =
+            self.is_geodetic() || (self.has(North) && self.has(East)) || (self.has(X) && self.has(Y));
+        let has_vertical = self.has_any(ColumnMeaning::is_height) || self.has(Down) || self.has(Z);
+        self.has_any(|meaning| meaning.is_time() || meaning == Date)
+            && ((has_plane && has_vertical) || self.has(Grid) || self.has(EarthCentred))
+    }
+}
+
 /// Message for a header without a time or a whole position: what is missing, and which names are not known.
 pub(super) fn missing_columns_message(header: &HeaderColumns) -> String {
-    use ColumnMeaning::{Down, East, Latitude, LatitudeLongitude, Longitude, North, X, Y, Z};
-    let any = |condition: &dyn Fn(ColumnMeaning) -> bool| !header.columns_where(condition).is_empty();
-    let has = |meaning: ColumnMeaning| any(&|other| other == meaning);
-    let has_time = any(&is_time);
-    let is_geodetic = has(LatitudeLongitude) || (has(Latitude) && has(Longitude));
-    let has_height = any(&is_height) || (!is_geodetic && (has(Down) || has(Z)));
+    let has = |meaning| header.has(meaning);
+    let has_time = header.has_any(ColumnMeaning::is_time);
+    let is_geodetic = header.is_geodetic();
+    let has_height = header.has_any(ColumnMeaning::is_height) || (!is_geodetic && (has(Down) || has(Z)));
     let pairs = [
         ("latitude", has(Latitude), "longitude", has(Longitude), "lat and lon"),
         ("north", has(North), "east", has(East), "north and east"),

@@ -9,14 +9,14 @@
 //!
 //! Motive's x is taken as east, its z as south, and its bodies have x forward and y up.
 
-use std::path::Path;
-
-use camsim_core::scenario::{AttitudeSource, FlightSpec, LogFormat};
+use camsim_core::{
+    flight_log::Note,
+    scenario::{AttitudeSource, FlightSpec, LogFormat},
+};
 
 use super::{
-    FlightLogError, RawLog,
-    column_selection::push_information,
-    columns::{AttitudeKind, Frame, format_name},
+    RawLog,
+    columns::{AttitudeKind, Frame},
     streams::{self, Stream, Streams},
     text_table::{self, Separator},
     time_fields,
@@ -128,35 +128,27 @@ impl<'a> Header<'a> {
 ///
 /// # Errors
 /// There is no rigid body or no choice among several, or its units, space or rotations are not read.
-pub(super) fn read(path: &Path, content: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    let header = Header::parse(content)
-        .ok_or_else(|| problem("the table of Motive has no line `Frame,...`".to_owned()))?;
+pub(super) fn read(content: &str, spec: &FlightSpec) -> Result<RawLog, String> {
+    let header = Header::parse(content).ok_or("the table of Motive has no line `Frame,...`")?;
     if spec.format != LogFormat::Auto {
-        return Err(problem(format!(
-            "flight.format is \"{}\" but the file is a table of Motive; remove the key",
-            format_name(spec.format)
-        )));
+        return Err(streams::other_format(spec, "a table of Motive"));
     }
     let mut notes = Vec::new();
     notes.extend(unused_height_note(spec));
-    let body = header.body(spec.topic.as_deref()).map_err(problem)?;
-    let unit = length_unit(&header).map_err(problem)?;
+    let body = header.body(spec.topic.as_deref())?;
+    let unit = length_unit(&header)?;
     let positions = header.columns::<3>(body, "Position");
-    let positions = positions.ok_or_else(|| problem(format!("the rigid body `{body}` has no positions")))?;
-    let rotations = rotations(&header, body, spec).map_err(problem)?;
-    push_information(
-        &mut notes,
-        format!(
-            "a table of Motive in {}: x is taken as east, z as south, y as up; bodies have x forward, y up",
-            unit.name
-        ),
-    );
+    let positions = positions.ok_or_else(|| format!("the rigid body `{body}` has no positions"))?;
+    let rotations = rotations(&header, body, spec)?;
+    notes.push(Note::information(format!(
+        "a table of Motive in {}: x is taken as east, z as south, y as up; bodies have x forward, y up",
+        unit.name
+    )));
     if let Some(start) = header.value("Capture Start Time") {
-        push_information(&mut notes, format!("times count from the start of the capture, {start}"));
+        notes.push(Note::information(format!("times count from the start of the capture, {start}")));
     }
     let time_column = header.axes.iter().position(|name| name.starts_with("Time"));
-    let time_column = time_column.ok_or_else(|| problem("the table of Motive has no times".to_owned()))?;
+    let time_column = time_column.ok_or("the table of Motive has no times")?;
     let mut rows = Vec::new();
     for (index, line) in
         content.lines().enumerate().skip(header.length).filter(|(_, line)| !line.trim().is_empty())
@@ -164,36 +156,25 @@ pub(super) fn read(path: &Path, content: &str, spec: &FlightSpec) -> Result<RawL
         let fields = cells(line);
         let number = |column: usize| {
             let text = fields.get(column).copied().unwrap_or("");
-            text_table::number(text, false).ok_or_else(|| FlightLogError::NotANumber {
-                path: path.to_owned(),
-                line: index + 1,
-                column: column + 1,
-                name: format!(" (`{body}`)"),
-                text: text.to_owned(),
-                hint: "",
+            text_table::number(text, false).ok_or_else(|| {
+                format!("line {}, column {} (`{body}`): `{text}` is not a number", index + 1, column + 1)
             })
         };
         let time = fields.get(time_column).and_then(|text| time_fields::fixed_point(text, false)?);
         let time = time.and_then(|time| time_fields::to_ns(time, SECOND.factor)).map(i128::from);
         let mut row = streams::empty_row(index + 1, time);
-        let mut position = [0.0; 3];
-        for (value, column) in position.iter_mut().zip(positions) {
-            *value = number(column)? * unit.factor;
-        }
-        row.position = east_north_up(position);
+        let [x, y, z] = positions.map(number);
+        row.position = east_north_up([x?, y?, z?].map(|value| value * unit.factor));
         if let Some(rotations) = rotations {
-            let mut q = [0.0; 4];
-            for (value, column) in q.iter_mut().zip(rotations) {
-                *value = number(column)?;
-            }
-            let [x, y, z] = east_north_up([q[0], q[1], q[2]]);
-            row.attitude = [x, y, z, q[3]];
+            let [x, y, z, w] = rotations.map(number);
+            let [x, y, z] = east_north_up([x?, y?, z?]);
+            row.attitude = [x, y, z, w?];
         }
         rows.push(row);
     }
     let kind = if rotations.is_some() { AttitudeKind::Quaternion } else { AttitudeKind::None };
     let position = Stream { name: body.to_owned(), rows };
-    Streams { frame: Frame::EastNorthUp, kind, position, attitude: None, notes }.into_log(path, spec)
+    Streams { frame: Frame::EastNorthUp, kind, position, attitude: None, notes }.into_log(spec)
 }
 
 /// A vector with z up of one with y up.

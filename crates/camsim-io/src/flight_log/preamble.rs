@@ -1,7 +1,6 @@
 //! Lines above the names of the columns that are no comments, as `Length Units,Millimeters`.
 
 use super::{
-    column_selection::has_time_and_position,
     header::HeaderColumns,
     text_table::{Line, Separator, is_header, is_value},
 };
@@ -20,7 +19,7 @@ pub(super) fn length(lines: &[Line<'_>], separator: Separator) -> usize {
             continue;
         }
         if is_header(line.text, separator, &mut fields) {
-            if has_row_above && has_time_and_position(&HeaderColumns::parse(&fields)) {
+            if has_row_above && HeaderColumns::parse(&fields).has_time_and_position() {
                 return index;
             }
             continue;

@@ -7,9 +7,9 @@ use camsim_core::flight_log::Note;
 
 use super::{
     column_meaning::FixCode,
-    column_selection::push_warning,
     layout::TableLayout,
-    text_table::{Table, is_missing},
+    text_table::{Line, Table, is_missing},
+    word_list::has_word,
 };
 
 /// With more values than this a column counts something else than receivers.
@@ -17,24 +17,22 @@ pub(super) const MAX_RECEIVERS: usize = 8;
 /// Fewer rows are no flight.
 pub(super) const MIN_ROWS: usize = 2;
 
-/// Removes the rows that the columns of receivers and fixes exclude, with notes.
+/// The table without the rows that the columns of receivers and fixes exclude.
 ///
 /// # Errors
 /// No rows are left: the error message.
-pub(super) fn keep_rows(
-    table: &mut Table<'_>,
+pub(super) fn good_rows<'a>(
+    table: Table<'a>,
     layout: &TableLayout,
     notes: &mut Vec<Note>,
-) -> Result<(), String> {
-    if let Some(column) = layout.receiver {
-        keep_one_receiver(table, layout, column, notes);
-    }
+) -> Result<Table<'a>, String> {
+    let table = match layout.receiver {
+        Some(column) => of_one_receiver(table, layout, column, notes),
+        None => table,
+    };
     let in_use = layout.in_use.map(|column| (column, Judgement::InUse));
     let fixes = layout.fixes.iter().map(|&(column, code)| (column, Judgement::Fix(code)));
-    for (column, judgement) in in_use.into_iter().chain(fixes) {
-        keep_good(table, layout, (column, judgement), notes)?;
-    }
-    Ok(())
+    in_use.into_iter().chain(fixes).try_fold(table, |table, judged| well_judged(table, layout, judged, notes))
 }
 
 /// How the fields of a column judge their rows.
@@ -72,77 +70,65 @@ impl Judgement {
     }
 }
 
-fn field_of<'a>(table: &Table<'a>, row: usize, column: usize) -> &'a str {
-    table.fields(&table.rows[row]).get(column).copied().unwrap_or("")
-}
-
-/// Keeps the rows whose receiver was in use, else those of the receiver of the lowest number.
-fn keep_one_receiver(table: &mut Table<'_>, layout: &TableLayout, receiver: usize, notes: &mut Vec<Note>) {
-    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    for row in 0..table.rows.len() {
-        let name = field_of(table, row, receiver);
-        if !is_missing(name) {
-            *counts.entry(name.to_owned()).or_default() += 1;
-        }
+/// The rows whose receiver was in use, else those of the receiver of the lowest number.
+fn of_one_receiver<'a>(
+    table: Table<'a>,
+    layout: &TableLayout,
+    receiver: usize,
+    notes: &mut Vec<Note>,
+) -> Table<'a> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for name in table.column(receiver).filter(|name| !is_missing(name)) {
+        *counts.entry(name).or_default() += 1;
         if counts.len() > MAX_RECEIVERS {
-            return;
+            break;
         }
     }
-    if counts.len() < 2 {
-        return;
+    if !(2..=MAX_RECEIVERS).contains(&counts.len()) {
+        return table;
     }
     let in_use = layout.in_use.filter(|&column| {
-        let uses: Vec<bool> =
-            (0..table.rows.len()).filter_map(|row| flag(field_of(table, row, column))).collect();
+        let uses: Vec<bool> = table.column(column).filter_map(flag).collect();
         uses.contains(&true) && uses.contains(&false)
     });
     let first = lowest(&counts);
-    let before = table.rows.len();
-    let keeps: Vec<bool> = (0..before)
-        .map(|row| {
-            let name = field_of(table, row, receiver);
-            // Rows of other messages name no receiver.
-            is_missing(name)
-                || match in_use {
-                    Some(column) => flag(field_of(table, row, column)) != Some(false),
-                    None => name == first,
-                }
-        })
-        .collect();
-    retain(table, &keeps);
+    let counts_row = |row: &Line<'_>| {
+        let name = table.field(row, receiver);
+        // Rows of other messages name no receiver.
+        is_missing(name)
+            || match in_use {
+                Some(column) => flag(table.field(row, column)) != Some(false),
+                None => name == first,
+            }
+    };
+    let keeps: Vec<bool> = table.rows.iter().map(counts_row).collect();
     let which = match in_use {
-        Some(column) => {
-            format!("those that column {}{} says are in use count", column + 1, layout.bracketed_name(column))
-        }
+        Some(column) => format!("those that {} says are in use count", layout.describe(column)),
         None => format!("those of `{first}` count"),
     };
-    notes.push(receivers_note(layout, receiver, &counts, &which, before - table.rows.len()));
+    notes.push(receivers_note(layout, receiver, &counts, &which, &keeps));
+    table.with_rows_kept(&keeps)
 }
 
 /// The receiver of the lowest number, else the first by name.
-pub(super) fn lowest(counts: &BTreeMap<String, usize>) -> String {
-    let by_number = |a: &&String, b: &&String| number(a).total_cmp(&number(b));
-    counts.keys().min_by(by_number).cloned().unwrap_or_default()
+pub(super) fn lowest<'a>(counts: &BTreeMap<&'a str, usize>) -> &'a str {
+    counts.keys().min_by(|a, b| number(a).total_cmp(&number(b))).copied().unwrap_or_default()
 }
 
 pub(super) fn receivers_note(
     layout: &TableLayout,
     receiver: usize,
-    counts: &BTreeMap<String, usize>,
+    counts: &BTreeMap<&str, usize>,
     which: &str,
-    left_out: usize,
+    keeps: &[bool],
 ) -> Note {
     let all: Vec<String> = counts.iter().map(|(name, rows)| format!("`{name}` ({rows} rows)")).collect();
-    Note {
-        is_warning: true,
-        text: format!(
-            "column {}{} has rows of {}: {which}, and {left_out} rows are left out; keep the rows of one to choose \
-                another",
-            receiver + 1,
-            layout.bracketed_name(receiver),
-            all.join(" and "),
-        ),
-    }
+    Note::warning(format!(
+        "{} has rows of {}: {which}, and {} rows are left out; keep the rows of one to choose another",
+        layout.describe(receiver),
+        all.join(" and "),
+        keeps.iter().filter(|keeps| !**keeps).count()
+    ))
 }
 
 /// A number, also in hexadecimal; infinity for any other text.
@@ -191,60 +177,12 @@ fn has_fix(text: &str, code: FixCode) -> Option<bool> {
 }
 
 /// Words for no position, in lower case, without marks.
-const NO_FIX: &[&str] = &[
-    "none",
-    "nofix",
-    "no",
-    "n",
-    "invalid",
-    "false",
-    "v",
-    "nogps",
-    "f",
-    "lost",
-    "notvalid",
-    "unavailable",
-    "void",
-    "bad",
-    "fail",
-    "failed",
-    "notracking",
-    "nottracking",
-    "nosolution",
-    "insufficientobs",
-    "noconvergence",
-    "searching",
-    "acquiring",
-];
+const NO_FIX: &str = "none nofix no n invalid false v nogps f lost notvalid unavailable void bad fail \
+    failed notracking nottracking nosolution insufficientobs noconvergence searching acquiring";
 
 /// Words for a position.
-const FIX: &[&str] = &[
-    "true",
-    "a",
-    "d",
-    "r",
-    "t",
-    "y",
-    "yes",
-    "valid",
-    "ok",
-    "good",
-    "fix",
-    "fixed",
-    "float",
-    "dgps",
-    "single",
-    "sbas",
-    "waas",
-    "ppp",
-    "spp",
-    "autonomous",
-    "tracking",
-    "tracked",
-    "solcomputed",
-    "inssolutiongood",
-    "solutiongood",
-];
+const FIX: &str = "true a d r t y yes valid ok good fix fixed float dgps single sbas waas ppp spp \
+    autonomous tracking tracked solcomputed inssolutiongood solutiongood";
 
 /// Beginnings of such words: `3DDiff`, `RTK_INT`, and NovAtel's types of positions.
 const FIX_BEGINNINGS: &[&str] = &["3d", "rtk", "narrow", "wide", "l1", "psr", "inspsr", "insrtk"];
@@ -254,90 +192,88 @@ fn word_has_fix(word: &str) -> Option<bool> {
         // `2D Lock`, `3D RTK GPS Lock (float)`.
         word if word.starts_with("2d") => Some(false),
         word if FIX_BEGINNINGS.iter().any(|beginning| word.starts_with(beginning)) => Some(true),
-        word if NO_FIX.contains(&word) => Some(false),
-        word if FIX.contains(&word) => Some(true),
+        word if has_word(NO_FIX, word) => Some(false),
+        word if has_word(FIX, word) => Some(true),
         _ => None,
     }
 }
 
-/// Removes the rows that a column judges as not of the flight.
-fn keep_good(
-    table: &mut Table<'_>,
+/// The table without the rows that a column judges as not of the flight.
+fn well_judged<'a>(
+    table: Table<'a>,
     layout: &TableLayout,
     (column, judgement): (usize, Judgement),
     notes: &mut Vec<Note>,
-) -> Result<(), String> {
-    let name = format!("column {}{}", column + 1, layout.bracketed_name(column));
-    let field = |row: usize| field_of(table, row, column);
-    let rows = 0..table.rows.len();
-    let is_flag = |row: usize| is_missing(field(row)) || matches!(number(field(row)), 0.0 | 1.0);
+) -> Result<Table<'a>, String> {
+    let name = layout.describe(column);
+    let fields: Vec<&str> = table.column(column).collect();
+    let is_flag = |field: &&str| is_missing(field) || matches!(number(field), 0.0 | 1.0);
     let judgement = if judgement == Judgement::Fix(FixCode::Dimensions)
-        && rows.clone().all(is_flag)
-        && rows.clone().any(|row| number(field(row)) == 1.0)
+        && fields.iter().all(is_flag)
+        && fields.iter().any(|field| number(field) == 1.0)
     {
-        push_warning(notes, format!("{name} holds only 0 and 1, so 1 is taken as a fix"));
+        notes.push(Note::warning(format!("{name} holds only 0 and 1, so 1 is taken as a fix")));
         Judgement::Fix(FixCode::NonZero)
     } else {
         judgement
     };
     let is_rate = || layout.names.iter().any(|name| ["p", "r"].contains(&&*name.to_ascii_lowercase()));
     if judgement == Judgement::Fix(FixCode::Rtklib) && is_rate() {
-        return Ok(());
+        return Ok(table);
     }
-    let judged: Vec<Option<bool>> = rows.clone().map(|row| judgement.of(field(row))).collect();
-    let unknown = rows.clone().find(|&row| judged[row].is_none() && !is_missing(field(row)));
+    let judged: Vec<Option<bool>> = fields.iter().map(|field| judgement.of(field)).collect();
+    let unknown = (0..fields.len()).find(|&row| judged[row].is_none() && !is_missing(fields[row]));
     match unknown {
         Some(row) if !judgement.is_vague() => {
-            let (text, line) = (field(row), table.rows[row].number);
-            push_warning(
-                notes,
-                format!("{name} is not read: `{text}` (line {line}) is no known quality of a fix"),
-            );
-            return Ok(());
+            notes.push(Note::warning(format!(
+                "{name} is not read: `{}` (line {}) is no known quality of a fix",
+                fields[row], table.rows[row].number
+            )));
+            return Ok(table);
         }
-        Some(_) if judgement != Judgement::Fix(FixCode::Words) => return Ok(()),
+        Some(_) if judgement != Judgement::Fix(FixCode::Words) => return Ok(table),
         _ => {}
     }
     if judgement == Judgement::Fix(FixCode::Satellites) {
-        warn_of_few_satellites(&name, rows.clone().map(field), notes);
+        notes.extend(few_satellites_note(&name, &fields));
     }
     let left_out = judged.iter().filter(|counts| **counts == Some(false)).count();
     if left_out == 0 {
-        return Ok(());
+        return Ok(table);
     }
     let (count, lack) = (judged.len(), judgement.lack());
     // Below 0 is no position whatever the other numbers are.
-    let is_unknown_code =
-        |row: usize| unknown.is_some() && (0.0..f64::INFINITY).contains(&number(field(row)));
-    let kept = rows.filter(|&row| judged[row] == Some(true) || is_unknown_code(row));
-    if kept.count() < MIN_ROWS {
-        let problem = format!("{name} says that {left_out} of {count} rows {lack}");
-        if !judgement.is_vague() {
-            return Err(format!("{problem}, so there is no flight: remove the column if that is not so"));
-        }
-        let other = other_in_use(table, layout, column, judgement);
-        push_warning(notes, format!("{problem}: it is not applied, for no flight would be left{other}"));
-        return Ok(());
+    let is_unknown_code = |field: &str| unknown.is_some() && (0.0..f64::INFINITY).contains(&number(field));
+    let kept = (0..count).filter(|&row| judged[row] == Some(true) || is_unknown_code(fields[row]));
+    let is_flight = kept.count() >= MIN_ROWS;
+    if !is_flight && !judgement.is_vague() {
+        return Err(format!(
+            "{name} says that {left_out} of {count} rows {lack}, so there is no flight: remove the column if \
+                that is not so"
+        ));
     }
-    let other = other_in_use(table, layout, column, judgement);
+    let other = other_in_use(&table, layout, column, judgement);
+    if !is_flight {
+        notes.push(Note::warning(format!(
+            "{name} says that {left_out} of {count} rows {lack}: it is not applied, for no flight would be \
+                left{other}"
+        )));
+        return Ok(table);
+    }
+    notes.push(Note::warning(format!("{left_out} rows {lack} by {name}, and are left out{other}")));
     let keeps: Vec<bool> = judged.iter().map(|counts| *counts != Some(false)).collect();
-    retain(table, &keeps);
-    push_warning(notes, format!("{left_out} rows {lack} by {name}, and are left out{other}"));
-    Ok(())
+    Ok(table.with_rows_kept(&keeps))
 }
 
 /// A position in three dimensions and the receiver's clock are four unknowns.
-fn warn_of_few_satellites<'a>(name: &str, fields: impl Iterator<Item = &'a str>, notes: &mut Vec<Note>) {
-    let few = fields.filter(|field| (1.0..4.0).contains(&number(field))).count();
-    if few > 0 {
-        push_warning(
-            notes,
-            format!(
-                "{few} rows have fewer than four satellites by {name}, which give no height: they are flown as they \
-                    stand; remove them if their positions jump"
-            ),
-        );
-    }
+fn few_satellites_note(name: &str, fields: &[&str]) -> Option<Note> {
+    let few = fields.iter().filter(|field| (1.0..4.0).contains(&number(field))).count();
+    (few > 0).then(|| {
+        Note::warning(format!(
+            "{few} rows have fewer than four satellites by {name}, which give no height: they are flown as \
+                they stand; remove them if their positions jump"
+        ))
+    })
 }
 
 /// Names another message of a merged table whose receiver was in use, as `GPS2.U` beside `GPS.U` says.
@@ -349,20 +285,14 @@ fn other_in_use(table: &Table<'_>, layout: &TableLayout, column: usize, judgemen
     let is_used = |&other: &usize| {
         other != column
             && parts(other).is_some_and(|(_, other)| other == field)
-            && (0..table.rows.len()).any(|row| flag(field_of(table, row, other)) == Some(true))
+            && table.column(other).any(|field| flag(field) == Some(true))
     };
     (0..layout.names.len()).find(is_used).map_or(String::new(), |other| {
         format!(
-            "; column {}{} says that its receiver was: remove the columns of `{message}` to fly it",
-            other + 1,
-            layout.bracketed_name(other)
+            "; {} says that its receiver was: remove the columns of `{message}` to fly it",
+            layout.describe(other)
         )
     })
-}
-
-pub(super) fn retain(table: &mut Table<'_>, keeps: &[bool]) {
-    let mut keeps = keeps.iter();
-    table.rows.retain(|_| keeps.next() != Some(&false));
 }
 
 #[cfg(test)]

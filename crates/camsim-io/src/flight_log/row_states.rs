@@ -6,11 +6,10 @@ use camsim_core::flight_log::Note;
 
 use super::{
     column_meaning::FixCode,
-    column_selection::push_warning,
-    columns::{AttitudeColumns, Frame},
+    columns::Frame,
     layout::TableLayout,
-    row_selection::{MAX_RECEIVERS, MIN_ROWS, lowest, receivers_note, retain},
-    rows::ParsedRow,
+    row_selection::{MAX_RECEIVERS, MIN_ROWS, lowest, receivers_note},
+    rows::{ParsedRow, ParsedRows},
     text_table::{Table, is_missing},
 };
 
@@ -20,27 +19,32 @@ const MIN_ZIGZAG: f64 = 1.5;
 /// Steps as often longer than those before and after them are jumps.
 const JUMP_FACTOR: f64 = 10.0;
 
-/// Keeps the rows of one receiver where a column tells interleaved tracks apart.
-pub(super) fn keep_one_track(
-    table: &mut Table<'_>,
+/// Table and rows of one receiver where a column tells interleaved tracks apart, else all.
+pub(super) fn one_track<'a>(
+    table: Table<'a>,
     layout: &TableLayout,
-    rows: &mut Vec<ParsedRow>,
+    mut parsed: ParsedRows,
     notes: &mut Vec<Note>,
-) {
-    let located: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].has_position()).collect();
-    let Some((column, counts)) = receiver_column(table, layout, rows, &located) else { return };
+) -> (Table<'a>, ParsedRows) {
+    let located = located(&parsed.rows);
+    let Some((column, counts)) = receiver_column(&table, layout, &parsed.rows, &located) else {
+        return (table, parsed);
+    };
     let first = lowest(&counts);
-    let mut keeps = vec![true; rows.len()];
-    let mut fields = Vec::new();
-    for &row in &located {
-        table.separator.split(table.rows[row].text, &mut fields);
-        keeps[row] = fields.get(column).is_none_or(|name| is_missing(name) || *name == first);
+    let mut keeps = vec![true; parsed.rows.len()];
+    for row in located {
+        let name = table.field(&table.rows[row], column);
+        keeps[row] = is_missing(name) || name == first;
     }
-    let left_out = keeps.iter().filter(|keeps| !**keeps).count();
-    retain(table, &keeps);
-    let mut keeps = keeps.iter();
-    rows.retain(|_| keeps.next() != Some(&false));
-    notes.push(receivers_note(layout, column, &counts, &format!("those of `{first}` count"), left_out));
+    notes.push(receivers_note(layout, column, &counts, &format!("those of `{first}` count"), &keeps));
+    let mut is_kept = keeps.iter();
+    parsed.rows.retain(|_| is_kept.next() != Some(&false));
+    (table.with_rows_kept(&keeps), parsed)
+}
+
+/// Indices of the rows with a position.
+fn located(rows: &[ParsedRow]) -> Vec<usize> {
+    (0..rows.len()).filter(|&row| rows[row].has_position()).collect()
 }
 
 /// The track of one value of a column.
@@ -60,12 +64,12 @@ struct Tracks<'a> {
 }
 
 /// The column that tells interleaved tracks apart best, with the rows of each of its values.
-fn receiver_column(
-    table: &Table<'_>,
+fn receiver_column<'a>(
+    table: &Table<'a>,
     layout: &TableLayout,
     rows: &[ParsedRow],
     located: &[usize],
-) -> Option<(usize, BTreeMap<String, usize>)> {
+) -> Option<(usize, BTreeMap<&'a str, usize>)> {
     let used = used_columns(layout);
     let mut columns: Vec<Option<Tracks<'_>>> =
         (0..table.columns).map(|column| (!used.contains(&column)).then(Tracks::default)).collect();
@@ -108,18 +112,14 @@ fn receiver_column(
         (zigzag > MIN_ZIGZAG).then_some((zigzag, column, tracks))
     });
     let (_, column, tracks) = candidates.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
-    let counts = tracks.by_value.iter().map(|(value, track)| ((*value).to_owned(), track.rows)).collect();
+    let counts = tracks.by_value.iter().map(|(value, track)| (*value, track.rows)).collect();
     Some((column, counts))
 }
 
 /// Columns whose meaning is known.
 fn used_columns(layout: &TableLayout) -> Vec<usize> {
     let mut used: Vec<usize> = layout.position.iter().map(|source| source.column).collect();
-    match layout.attitude {
-        AttitudeColumns::None => {}
-        AttitudeColumns::Euler(sources) => used.extend(sources.map(|source| source.column)),
-        AttitudeColumns::Quaternion(columns) => used.extend(columns),
-    }
+    used.extend(layout.attitude.columns());
     used.push(layout.time.column);
     used.extend(layout.time.date.into_iter().chain(layout.time.nanoseconds).chain(layout.in_use));
     used.extend(layout.fixes.iter().map(|(column, _)| *column));
@@ -145,7 +145,7 @@ pub(super) fn warn_of_states(
     if states.is_empty() {
         return;
     }
-    let located: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].has_position()).collect();
+    let located = located(rows);
     let step = |pair: &[usize]| distance(layout.frame, rows[pair[0]].position, rows[pair[1]].position);
     let steps: Vec<f64> = located.windows(2).map(step).collect();
     let is_jump = |index: usize| {
@@ -157,23 +157,19 @@ pub(super) fn warn_of_states(
     let jumps: Vec<usize> = (0..steps.len()).filter(|&index| is_jump(index)).collect();
     let Some(&first_jump) = jumps.first() else { return };
     for column in states {
-        let field = |row: usize| table.fields(&table.rows[row]).get(column).copied().unwrap_or("");
+        let field = |row: usize| table.field(&table.rows[row], column);
         let changes: Vec<bool> = located.windows(2).map(|pair| field(pair[0]) != field(pair[1])).collect();
         let is_rare = changes.iter().filter(|changes| **changes).count() * 4 <= changes.len();
         if is_rare && jumps.iter().all(|&jump| changes[jump]) {
             let (before, after) = (located[first_jump], located[first_jump + 1]);
-            push_warning(
-                notes,
-                format!(
-                    "column {}{} is not read, but the position jumps as it changes from `{}` to `{}` (line {}): \
+            notes.push(Note::warning(format!(
+                "{} is not read, but the position jumps as it changes from `{}` to `{}` (line {}): \
                         remove the rows whose state means no position",
-                    column + 1,
-                    layout.bracketed_name(column),
-                    field(before),
-                    field(after),
-                    table.rows[after].number
-                ),
-            );
+                layout.describe(column),
+                field(before),
+                field(after),
+                table.rows[after].number
+            )));
         }
     }
 }

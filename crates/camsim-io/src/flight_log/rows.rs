@@ -1,16 +1,12 @@
 //! Parsing of rows: numbers in the units that the header names, else as the file has them.
 
-use std::path::Path;
-
 use camsim_core::flight_log::Note;
 
 use super::{
-    FlightLogError,
-    column_selection::push_warning,
-    columns::{AttitudeColumns, FieldSource, Frame, format_name},
+    columns::{AttitudeColumns, FieldSource, Frame},
     layout::TableLayout,
     text_table::{self, Line, Table},
-    time_fields::{self, TimeFormat},
+    time_fields::{self, Clock, TimeFormat},
     written_numbers,
 };
 
@@ -41,10 +37,8 @@ impl ParsedRow {
 /// All rows of a table.
 #[derive(Debug)]
 pub(super) struct ParsedRows {
-    /// Format of the times.
-    pub(super) time_format: TimeFormat,
-    /// Whether dates have been added to clock times.
-    pub(super) has_dates: bool,
+    /// What the times are.
+    pub(super) clock: Clock,
     /// Rows in the order of the file.
     pub(super) rows: Vec<ParsedRow>,
 }
@@ -55,54 +49,39 @@ pub(super) struct ParsedRows {
 /// A field is no number, a row is too short or too long, a position is out of range, or there are several
 /// vehicles.
 pub(super) fn read(
-    path: &Path,
     table: &Table<'_>,
     layout: &TableLayout,
     notes: &mut Vec<Note>,
-) -> Result<ParsedRows, FlightLogError> {
-    let mut fields = Vec::new();
-    let mut time_format = None;
-    for line in &table.rows {
-        table.separator.split(line.text, &mut fields);
-        time_format = fields.get(layout.time.column).and_then(|field| TimeFormat::detect(field));
-        if time_format.is_some() {
-            break;
-        }
-    }
-    check_single_vehicle(path, table, layout)?;
-    let is_clock = time_format == Some(TimeFormat::Clock);
-    let date = layout.time.date.filter(|_| is_clock);
+) -> Result<ParsedRows, String> {
+    let format = table.column(layout.time.column).find_map(TimeFormat::detect);
+    check_single_vehicle(table, layout)?;
+    let date = layout.time.date.filter(|_| format == Some(TimeFormat::Clock));
     let unread = date.and_then(|date| constant_text(table, date));
     if let Some((column, text)) = date.zip(unread).filter(|(_, text)| !text_table::is_missing(text)) {
-        push_warning(
-            notes,
-            format!(
-                "column {}{} holds dates that are not read (`{text}`): write year-month-day; the times count \
-                    from midnight",
-                column + 1,
-                layout.bracketed_name(column)
-            ),
-        );
+        notes.push(Note::warning(format!(
+            "{} holds dates that are not read (`{text}`): write year-month-day; the times count from \
+                midnight",
+            layout.describe(column)
+        )));
     }
-    let date = date.filter(|_| unread.is_none());
     let reader = RowReader {
-        date,
-        path,
+        date: date.filter(|_| unread.is_none()),
         table,
         layout,
-        time_format: time_format.unwrap_or(TimeFormat::Number),
+        format: format.unwrap_or(TimeFormat::Number),
         max_columns: if layout.has_header { layout.names.len() } else { table.columns },
     };
+    let mut fields = Vec::new();
     let rows = table.rows.iter().map(|line| reader.row(line, &mut fields)).collect::<Result<_, _>>()?;
-    Ok(ParsedRows { time_format: reader.time_format, has_dates: reader.date.is_some(), rows })
+    let clock = Clock { format: reader.format, has_dates: reader.date.is_some() };
+    Ok(ParsedRows { clock, rows })
 }
 
 /// Parses the rows of a table.
 struct RowReader<'a> {
-    path: &'a Path,
     table: &'a Table<'a>,
     layout: &'a TableLayout,
-    time_format: TimeFormat,
+    format: TimeFormat,
     /// The column of dates, unless it has one constant, unreadable text.
     date: Option<usize>,
     /// Number of columns that a row may have.
@@ -110,56 +89,39 @@ struct RowReader<'a> {
 }
 
 /// Refuses rows of several vehicles.
-fn check_single_vehicle(path: &Path, table: &Table<'_>, layout: &TableLayout) -> Result<(), FlightLogError> {
+fn check_single_vehicle(table: &Table<'_>, layout: &TableLayout) -> Result<(), String> {
     let Some(column) = layout.vehicle else { return Ok(()) };
-    let mut fields = Vec::new();
-    let mut first: Option<&str> = None;
-    for line in &table.rows {
-        table.separator.split(line.text, &mut fields);
-        let Some(name) = fields.get(column).copied().filter(|name| !text_table::is_missing(name)) else {
-            continue;
-        };
-        match first {
-            Some(first) if first != name => {
-                return Err(FlightLogError::Values {
-                    path: path.to_owned(),
-                    problem: format!(
-                        "line {}: `{name}` in column {}{}, but `{first}` before: keep the rows of one \
-                            vehicle, or remove the column if they are all of one",
-                        line.number,
-                        column + 1,
-                        layout.bracketed_name(column)
-                    ),
-                });
-            }
-            _ => first = Some(name),
-        }
+    let rows = table.rows.iter().map(|row| (row.number, table.field(row, column)));
+    let mut named = rows.filter(|(_, name)| !text_table::is_missing(name));
+    let Some((_, first)) = named.next() else { return Ok(()) };
+    match named.find(|(_, name)| *name != first) {
+        Some((line, name)) => Err(format!(
+            "line {line}: `{name}` in {}, but `{first}` before: keep the rows of one vehicle, or remove the \
+                column if they are all of one",
+            layout.describe(column)
+        )),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// The text that a column holds throughout, if it is no date. Such dates are not read.
 fn constant_text<'a>(table: &Table<'a>, column: usize) -> Option<&'a str> {
-    let mut fields = Vec::new();
-    let mut first = None;
-    let is_constant = table.rows.iter().all(|line| {
-        table.separator.split(line.text, &mut fields);
-        let field = fields.get(column).copied().unwrap_or("");
-        time_fields::date_ns(field).is_none() && *first.get_or_insert(field) == field
-    });
-    first.filter(|_| is_constant)
+    let first = table.column(column).next()?;
+    let is_unread = |field: &str| time_fields::date_ns(field).is_none() && field == first;
+    table.column(column).all(is_unread).then_some(first)
 }
 
 impl<'a> RowReader<'a> {
-    fn row(&self, line: &Line<'a>, fields: &mut Vec<&'a str>) -> Result<ParsedRow, FlightLogError> {
+    fn row(&self, line: &Line<'a>, fields: &mut Vec<&'a str>) -> Result<ParsedRow, String> {
         self.table.separator.split(line.text, fields);
         if fields.iter().skip(self.max_columns).any(|field| !field.is_empty()) {
-            return Err(FlightLogError::SurplusColumns {
-                path: self.path.to_owned(),
-                line: line.number,
-                found: fields.len(),
-                known: self.max_columns,
-            });
+            return Err(format!(
+                "line {} has {} columns, but only {} are known: a separator within a field shifts the ones \
+                    behind it (put the field in quotes)",
+                line.number,
+                fields.len(),
+                self.max_columns
+            ));
         }
         let row = RowFields { reader: self, line: line.number, fields };
         let time = row.time()?;
@@ -171,19 +133,16 @@ impl<'a> RowReader<'a> {
         if self.layout.frame == Frame::Geodetic {
             row.check_geodetic_range(position)?;
         }
-        let mut attitude = [f64::NAN; 4];
-        match self.layout.attitude {
-            AttitudeColumns::None => {}
-            AttitudeColumns::Euler(sources) => {
-                for (value, source) in attitude.iter_mut().zip(sources) {
-                    *value = row.number(source)?;
-                }
-            }
+        let sources = match self.layout.attitude {
+            AttitudeColumns::None => Vec::new(),
+            AttitudeColumns::Euler(sources) => sources.to_vec(),
             AttitudeColumns::Quaternion(columns) => {
-                for (value, column) in attitude.iter_mut().zip(columns) {
-                    *value = row.number(FieldSource { column, part: None, factor: None })?;
-                }
+                columns.map(|column| FieldSource::whole(column, None)).to_vec()
             }
+        };
+        let mut attitude = [f64::NAN; 4];
+        for (value, source) in attitude.iter_mut().zip(sources) {
+            *value = row.number(source)?;
         }
         Ok(ParsedRow { line: line.number, time, position, attitude })
     }
@@ -197,29 +156,29 @@ struct RowFields<'a, 'b> {
 }
 
 impl<'a> RowFields<'a, '_> {
-    fn field(&self, column: usize) -> Result<&'a str, FlightLogError> {
+    fn field(&self, column: usize) -> Result<&'a str, String> {
         let layout = self.reader.layout;
-        self.fields.get(column).copied().ok_or_else(|| FlightLogError::MissingColumns {
-            path: self.reader.path.to_owned(),
-            line: self.line,
-            found: self.fields.len(),
-            needed: layout.required_columns(),
-            format: format_name(layout.format),
+        self.fields.get(column).copied().ok_or_else(|| {
+            format!(
+                "line {} has {} columns, {} needs {}; complete the line or set flight.format",
+                self.line,
+                self.fields.len(),
+                layout.format.name(),
+                layout.required_columns()
+            )
         })
     }
 
-    fn not_a_number(&self, column: usize, text: &str) -> FlightLogError {
-        FlightLogError::NotANumber {
-            path: self.reader.path.to_owned(),
-            line: self.line,
-            column: column + 1,
-            name: self.reader.layout.bracketed_name(column),
-            text: text.to_owned(),
-            hint: hint(text),
-        }
+    /// Line and column of a field, for messages.
+    fn place(&self, column: usize) -> String {
+        format!("line {}, {}", self.line, self.reader.layout.describe(column))
     }
 
-    fn number(&self, source: FieldSource) -> Result<f64, FlightLogError> {
+    fn not_a_number(&self, column: usize, text: &str) -> String {
+        format!("{}: `{text}` is not a number{}", self.place(column), hint(text))
+    }
+
+    fn number(&self, source: FieldSource) -> Result<f64, String> {
         let field = self.field(source.column)?;
         let bad = || self.not_a_number(source.column, field);
         let value = match source.part {
@@ -249,14 +208,14 @@ impl<'a> RowFields<'a, '_> {
         }
     }
 
-    fn time(&self) -> Result<Option<i128>, FlightLogError> {
+    fn time(&self) -> Result<Option<i128>, String> {
         let columns = self.reader.layout.time;
         let field = self.field(columns.column)?;
         if text_table::is_missing(field) {
             return Ok(None);
         }
         let bad = |column: usize, text: &str| self.not_a_number(column, text);
-        match self.reader.time_format {
+        match self.reader.format {
             TimeFormat::DateTime => {
                 time_fields::date_time_ns(field).map(Some).ok_or_else(|| bad(columns.column, field))
             }
@@ -284,18 +243,10 @@ impl<'a> RowFields<'a, '_> {
     }
 
     /// Refuses latitudes, longitudes and heights that are out of range.
-    fn check_geodetic_range(&self, [latitude, longitude, height_m]: [f64; 3]) -> Result<(), FlightLogError> {
+    fn check_geodetic_range(&self, [latitude, longitude, height_m]: [f64; 3]) -> Result<(), String> {
         let sources = self.reader.layout.position;
-        let fail = |source: FieldSource, what: &'static str, value: f64, advice: &'static str| {
-            Err(FlightLogError::OutOfRange {
-                path: self.reader.path.to_owned(),
-                line: self.line,
-                column: source.column + 1,
-                name: self.reader.layout.bracketed_name(source.column),
-                what,
-                value,
-                advice,
-            })
+        let fail = |source: FieldSource, what: &str, value: f64, advice: &str| {
+            Err(format!("{}: {value} is no {what}; {advice}", self.place(source.column)))
         };
         for (source, what, value, limit) in
             [(sources[0], "latitude", latitude, 90.0), (sources[1], "longitude", longitude, 360.0)]

@@ -8,18 +8,18 @@ use std::collections::HashSet;
 
 use camsim_core::flight_log::Note;
 
-use super::rows::ParsedRow;
+use super::{columns::AttitudeKind, rows::ParsedRow};
 use crate::median::median;
 
 const SECOND_NS: i128 = 1_000_000_000;
 
 /// Interpolates the missing positions of a sparse table. Times are nanoseconds.
-pub(super) fn interpolate_positions(
-    rows: &mut Vec<ParsedRow>,
+pub(super) fn interpolated(
+    mut rows: Vec<ParsedRow>,
     is_geodetic: bool,
-    reads_attitude: bool,
+    kind: AttitudeKind,
     notes: &mut Vec<Note>,
-) {
+) -> Vec<ParsedRow> {
     let has_plane =
         |row: &ParsedRow| row.time.is_some() && row.position[0].is_finite() && row.position[1].is_finite();
     let has_height = |row: &ParsedRow| row.time.is_some() && row.position[2].is_finite();
@@ -27,21 +27,21 @@ pub(super) fn interpolate_positions(
         |rows: &[ParsedRow], has: &dyn Fn(&ParsedRow) -> bool| rows.iter().filter(|row| has(row)).count();
     let mut filled = Vec::new();
 
-    let (planes, heights) = (count(rows, &has_plane), count(rows, &has_height));
-    let both = count(rows, &|row| has_plane(row) && has_height(row));
+    let (planes, heights) = (count(&rows, &has_plane), count(&rows, &has_height));
+    let both = count(&rows, &|row| has_plane(row) && has_height(row));
     if planes > 0 && heights > 1 && both * 2 < planes {
-        interpolate(rows, 2..3, is_geodetic, &has_height, &|row: &ParsedRow| {
+        interpolate(&mut rows, 2..3, is_geodetic, &has_height, &|row: &ParsedRow| {
             has_plane(row) && !has_height(row)
         });
         filled.push("heights");
     }
     let has_position = |row: &ParsedRow| row.time.is_some() && row.has_position();
     let has_attitude = |row: &ParsedRow| row.time.is_some() && row.has_attitude();
-    let attitudes = count(rows, &has_attitude);
-    let lone_attitudes = count(rows, &|row| has_attitude(row) && !has_position(row));
-    let positions = count(rows, &has_position);
-    if reads_attitude && positions > 1 && lone_attitudes * 2 > attitudes {
-        interpolate(rows, 0..3, is_geodetic, &has_position, &|row: &ParsedRow| {
+    let attitudes = count(&rows, &has_attitude);
+    let lone_attitudes = count(&rows, &|row| has_attitude(row) && !has_position(row));
+    let positions = count(&rows, &has_position);
+    if kind != AttitudeKind::None && positions > 1 && lone_attitudes * 2 > attitudes {
+        interpolate(&mut rows, 0..3, is_geodetic, &has_position, &|row: &ParsedRow| {
             has_attitude(row) && !has_position(row)
         });
         filled.push("positions");
@@ -51,25 +51,23 @@ pub(super) fn interpolate_positions(
         rows.retain(|row| row.has_attitude() || !complete.contains(&row.time));
     }
     let is_empty_row = |row: &ParsedRow| !has_position(row) && !row.has_attitude();
-    let empty = count(rows, &is_empty_row);
+    let empty = count(&rows, &is_empty_row);
     if empty * 3 > rows.len() && empty < rows.len() {
         rows.retain(|row| !is_empty_row(row));
         let text = format!(
             "{empty} rows state neither a whole position nor an attitude, as in tables merged from several \
                 streams, and are left out"
         );
-        notes.push(Note { is_warning: false, text });
+        notes.push(Note::information(text));
     }
     if !filled.is_empty() {
-        notes.push(Note {
-            is_warning: true,
-            text: format!(
-                "no row states everything: {} are interpolated between the rows that state them ({positions} \
+        notes.push(Note::warning(format!(
+            "no row states everything: {} are interpolated between the rows that state them ({positions} \
                     with a position, {attitudes} with an attitude)",
-                filled.join(" and ")
-            ),
-        });
+            filled.join(" and ")
+        )));
     }
+    rows
 }
 
 /// Interpolates `axes` of the positions of the rows that `is_wanted` selects, between those that `is_known`

@@ -5,25 +5,23 @@ use super::{
     header::{HeaderColumn, HeaderColumns, ParsedName, normal_form},
     text_table::Table,
     units::{NANOSECOND, SECOND},
+    word_list::has_word,
 };
 
-const SECONDS: [&str; 4] = ["sec", "secs", "second", "seconds"];
-const NANOSECONDS: [&str; 6] = ["nsec", "nsecs", "nanosec", "nanosecs", "nanosecond", "nanoseconds"];
+const SECONDS: &str = "sec secs second seconds";
+const NANOSECONDS: &str = "nsec nsecs nanosec nanosecs nanosecond nanoseconds";
 const SECOND_NS: f64 = 1e9;
 
 /// Gives the two columns of each time their meanings: `NAME.secs` and `NAME.nsecs`, whatever the name. A name that
 /// is only `nsecs` belongs to the column before it.
 pub(super) fn apply(columns: &mut [HeaderColumn]) {
     for part in 0..columns.len() {
-        let Some(name) = stem_before(&columns[part].name, &NANOSECONDS) else { continue };
-        let is_seconds_of = |column: &HeaderColumn| match stem_before(&column.name, &SECONDS) {
-            Some(seconds) => seconds == name,
-            None => false,
-        };
-        let before = part.checked_sub(1).and_then(|before| stem_before(&columns[before].name, &SECONDS));
+        let Some(name) = stem_before(&columns[part].name, NANOSECONDS) else { continue };
+        let is_seconds_of =
+            |column: &HeaderColumn| stem_before(&column.name, SECONDS).is_some_and(|stem| stem == name);
+        let before = part.checked_sub(1).and_then(|before| stem_before(&columns[before].name, SECONDS));
         // `secs` and `nsecs` alone are known names.
-        let has_plain_seconds =
-            || columns.iter().any(|column| SECONDS.contains(&&*normal_form(&column.name)));
+        let has_plain_seconds = || columns.iter().any(|column| has_word(SECONDS, &normal_form(&column.name)));
         let (seconds, name) = match before {
             Some(before) if name.is_empty() && !has_plain_seconds() => (part - 1, before),
             _ if name.is_empty() => continue,
@@ -40,17 +38,19 @@ pub(super) fn apply(columns: &mut [HeaderColumn]) {
 }
 
 /// The beginning of a name, in normal form, before one of several last words; `None` where it has another.
-fn stem_before(name: &str, words: &[&str]) -> Option<String> {
+fn stem_before(name: &str, words: &str) -> Option<String> {
     let normal = normal_form(name.trim_matches(['"', '\'', ' ']));
     let begin = normal.rfind('_').map_or(0, |end| end + 1);
-    words.contains(&&normal[begin..]).then(|| normal[..begin].to_owned())
+    has_word(words, &normal[begin..]).then(|| normal[..begin].to_owned())
 }
 
 /// The column of the nanoseconds that belong to one of seconds.
 pub(super) fn nanoseconds_of(header: &HeaderColumns, seconds: usize) -> Option<usize> {
     let name = header.stem(seconds).strip_suffix("secs")?;
-    let parts = header.columns_where(|meaning| meaning == ColumnMeaning::NanosecondsPart);
-    parts.into_iter().find(|&part| header.stem(part) == format!("{name}nsecs"))
+    header
+        .columns(ColumnMeaning::NanosecondsPart)
+        .into_iter()
+        .find(|&part| header.stem(part) == format!("{name}nsecs"))
 }
 
 /// Refuses nanoseconds within a second as the only time.
@@ -58,15 +58,10 @@ pub(super) fn nanoseconds_of(header: &HeaderColumns, seconds: usize) -> Option<u
 /// # Errors
 /// All numbers are below 1e9, and they begin again.
 pub(super) fn check_is_clock(header: &HeaderColumns, table: &Table<'_>, column: usize) -> Result<(), String> {
-    let mut before = f64::NEG_INFINITY;
-    let mut again = None;
+    let (mut before, mut again) = (f64::NEG_INFINITY, None);
     for row in &table.rows {
-        let Some(value) = table.fields(row).get(column).and_then(|field| table.number(field)) else {
-            continue;
-        };
-        if value.is_nan() {
-            continue;
-        }
+        let value = table.number(table.field(row, column));
+        let Some(value) = value.filter(|value| !value.is_nan()) else { continue };
         if !(0.0..SECOND_NS).contains(&value) {
             return Ok(());
         }

@@ -2,7 +2,7 @@
 
 use camsim_core::flight_log::Note;
 
-use super::{column_selection::push_warning, rows::ParsedRow, time_unit::format_short};
+use super::{rows::ParsedRow, time_unit::format_short};
 use crate::median::median;
 
 /// Consecutive rows of one stamp: indices of rows.
@@ -13,15 +13,15 @@ struct Group {
 
 /// Spreads rows that share the stamps of a coarse clock over its steps. Times are nanoseconds, in the file's
 /// order.
-pub(super) fn spread_equal_stamps(rows: &mut [ParsedRow], notes: &mut Vec<Note>) {
-    let groups = groups(rows);
-    let [first, .., last] = &groups[..] else { return };
+pub(super) fn spread_equal_stamps(mut rows: Vec<ParsedRow>, notes: &mut Vec<Note>) -> Vec<ParsedRow> {
+    let groups = groups(&rows);
+    let [first, .., last] = &groups[..] else { return rows };
     let steps = || groups.windows(2).map(|pair| pair[1].time_ns - pair[0].time_ns);
     let resolution_ns = steps().min().unwrap_or(0);
     let shared: Vec<&Group> = groups.iter().filter(|group| group.rows.len() > 1).collect();
-    let moving = shared.iter().filter(|group| has_motion(rows, &group.rows)).count();
+    let moving = shared.iter().filter(|group| has_motion(&rows, &group.rows)).count();
     if resolution_ns <= 0 || shared.len() * 2 < groups.len() || moving * 2 < shared.len() {
-        return;
+        return rows;
     }
     let mut sizes: Vec<usize> = groups.iter().map(|group| group.rows.len()).collect();
     let usual_size = median(&mut sizes, Ord::cmp).unwrap_or(1);
@@ -47,14 +47,12 @@ pub(super) fn spread_equal_stamps(rows: &mut [ParsedRow], notes: &mut Vec<Note>)
     for (&row, time) in groups.iter().flat_map(|group| &group.rows).zip(times) {
         rows[row].time = Some(time);
     }
-    push_warning(
-        notes,
-        format!(
+    notes.push(Note::warning(format!(
             "the clock of the log counts in steps of {} s, with {usual_size} rows in most: they are spread evenly \
                 over each step",
             format_short(resolution_ns as f64 * 1e-9)
-        ),
-    );
+        )));
+    rows
 }
 
 fn groups(rows: &[ParsedRow]) -> Vec<Group> {
@@ -138,8 +136,7 @@ mod tests {
     }
 
     fn spread(stamps_s: &[i128]) -> Vec<f64> {
-        let mut rows = rows(stamps_s);
-        spread_equal_stamps(&mut rows, &mut Vec::new());
+        let rows = spread_equal_stamps(rows(stamps_s), &mut Vec::new());
         rows.iter().map(|row| row.time.unwrap() as f64 * 1e-9).collect()
     }
 

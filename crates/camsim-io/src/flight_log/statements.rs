@@ -13,7 +13,6 @@ use camsim_core::{
 use super::{
     angle_unit::unit_of_angle_key,
     column_meaning::ColumnMeaning,
-    column_selection::{push_information, push_warning},
     columns::{AttitudeColumns, Frame},
     header::parse_name,
     layout::TableLayout,
@@ -59,7 +58,7 @@ pub(super) fn apply(
     let more = doubts.len().saturating_sub(MAX_QUOTED);
     let quoted: Vec<String> = doubts.iter().take(MAX_QUOTED).map(Doubt::describe).collect();
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
-    push_warning(notes, format!("not applied: {}{more}", quoted.join("; ")));
+    notes.push(Note::warning(format!("not applied: {}{more}", quoted.join("; "))));
 }
 
 /// A comment of RTKLIB that says where local positions count from, unless flight.origin says the same.
@@ -151,10 +150,11 @@ fn apply_units(
         }
     }
     for (line, unit, names) in applied {
-        push_information(
-            notes,
-            format!("line {line} states the unit of `{}`: {}", names.join("`, `"), unit.name),
-        );
+        notes.push(Note::information(format!(
+            "line {line} states the unit of `{}`: {}",
+            names.join("`, `"),
+            unit.name
+        )));
     }
     doubts
 }

@@ -3,16 +3,15 @@
 //! Each stream is sorted by its own clock. Rows stand at the instants of both streams; positions are
 //! interpolated at the instants of the attitude, attitudes later at those of the positions, as rotations.
 
-use std::path::Path;
-
 use camsim_core::{
     flight_log::Note,
     scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat},
 };
 
 use super::{
-    FlightLogError, RawLog, clock_rollover,
-    columns::{AttitudeKind, Frame, format_name},
+    RawLog, clock_rollover,
+    columns::{AttitudeKind, Frame},
+    height_column::surface,
     quaternions, raw_row,
     rows::ParsedRow,
     sparse_rows, unused_keys,
@@ -50,21 +49,20 @@ impl Streams {
     ///
     /// # Errors
     /// No position is usable, or the values are those of several flights or of no quaternions.
-    pub(super) fn into_log(mut self, path: &Path, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-        let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-        unused_keys::unused_unit_notes(spec, &mut self.notes);
+    pub(super) fn into_log(mut self, spec: &FlightSpec) -> Result<RawLog, String> {
+        self.notes.extend(unused_keys::unused_unit_notes(spec));
         if spec.attitude == AttitudeSource::Track {
             self.attitude = None;
             self.position.rows.iter_mut().for_each(|row| row.attitude = [f64::NAN; 4]);
         }
-        clock_rollover::check_single_flight(&self.position.rows).map_err(problem)?;
+        clock_rollover::check_single_flight(&self.position.rows)?;
         self.position.sort(&mut self.notes);
         self.position.rows.retain(|row| row.time.is_some());
         if !self.position.rows.iter().any(ParsedRow::has_position) {
-            return Err(problem(format!("`{}` has no usable position", self.position.name)));
+            return Err(format!("`{}` has no usable position", self.position.name));
         }
-        self.position.check_clock().map_err(problem)?;
-        let mut rows = match self.attitude.take() {
+        self.position.check_clock()?;
+        let rows = match self.attitude.take() {
             Some(mut attitude) => {
                 attitude.sort(&mut self.notes);
                 attitude.rows.retain(|row| row.time.is_some() && row.has_attitude());
@@ -72,9 +70,7 @@ impl Streams {
             }
             None => self.position.rows,
         };
-        if self.kind == AttitudeKind::Quaternion {
-            quaternions::normalise(&mut rows, &mut self.notes).map_err(problem)?;
-        }
+        let rows = quaternions::normalised(rows, self.kind, &mut self.notes)?;
         let rows = rows.iter().map(|row| raw_row(row, self.frame, self.kind)).collect();
         Ok(RawLog { rows, notes: self.notes, quaternions: None })
     }
@@ -102,13 +98,10 @@ impl Stream {
         let mut falls = self.rows.windows(2).filter(late);
         let Some(first) = falls.next() else { return };
         let count = 1 + falls.count();
-        notes.push(Note {
-            is_warning: true,
-            text: format!(
-                "the times of `{}` go back {count} times, first at message {}: sorted by time",
-                self.name, first[1].line
-            ),
-        });
+        notes.push(Note::warning(format!(
+            "the times of `{}` go back {count} times, first at message {}: sorted by time",
+            self.name, first[1].line
+        )));
         self.rows.sort_by_key(|row| row.time);
     }
 }
@@ -116,7 +109,7 @@ impl Stream {
 /// Rows at the instants of both streams, which are sorted.
 fn merge(position: Stream, attitude: Stream, is_geodetic: bool, notes: &mut Vec<Note>) -> Vec<ParsedRow> {
     if attitude.rows.is_empty() {
-        notes.push(Note { is_warning: true, text: format!("`{}` has no usable attitude", attitude.name) });
+        notes.push(Note::warning(format!("`{}` has no usable attitude", attitude.name)));
         return position.rows;
     }
     gap_note(&position, notes);
@@ -133,26 +126,20 @@ fn merge(position: Stream, attitude: Stream, is_geodetic: bool, notes: &mut Vec<
     rows.retain(|row| row.has_position() || !row.has_attitude());
     let outside = before - rows.len();
     if outside > 0 {
-        notes.push(Note {
-            is_warning: false,
-            text: format!(
-                "{outside} of {} attitudes are before the first or after the last position, and are left out",
-                attitude.rows.len()
-            ),
-        });
+        notes.push(Note::information(format!(
+            "{outside} of {} attitudes are before the first or after the last position, and are left out",
+            attitude.rows.len()
+        )));
     }
     rows.retain(|row| row.has_attitude() || row.time.is_none_or(|time| !has_near(time)));
     rows.sort_by_key(|row| row.time);
-    notes.push(Note {
-        is_warning: false,
-        text: format!(
-            "positions of `{}` ({}) are interpolated at the instants of `{}` ({})",
-            position.name,
-            position.rows.len(),
-            attitude.name,
-            attitude.rows.len()
-        ),
-    });
+    notes.push(Note::information(format!(
+        "positions of `{}` ({}) are interpolated at the instants of `{}` ({})",
+        position.name,
+        position.rows.len(),
+        attitude.name,
+        attitude.rows.len()
+    )));
     rows
 }
 
@@ -164,46 +151,50 @@ fn gap_note(position: &Stream, notes: &mut Vec<Note>) {
     let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
     let gaps = steps.clone().filter(|step| *step > gap_ns).count();
     if gaps > 0 {
-        notes.push(Note {
-            is_warning: true,
-            text: format!(
-                "`{}` has {gaps} gaps of more than {:.1} s, the longest {:.1} s: straight lines lead over them",
-                position.name,
-                gap_ns as f64 * 1e-9,
-                steps.max().unwrap_or(0) as f64 * 1e-9
-            ),
-        });
+        notes.push(Note::warning(format!(
+            "`{}` has {gaps} gaps of more than {:.1} s, the longest {:.1} s: straight lines lead over them",
+            position.name,
+            gap_ns as f64 * 1e-9,
+            steps.max().unwrap_or(0) as f64 * 1e-9
+        )));
     }
 }
 
 /// Refuses a file whose format is another one than `flight.format` says.
-pub(super) fn check_format(path: &Path, spec: &FlightSpec, actual: LogFormat) -> Result<(), FlightLogError> {
-    if spec.format == LogFormat::Auto || spec.format == actual {
-        return Ok(());
+pub(super) fn check_format(spec: &FlightSpec, actual: LogFormat) -> Result<(), String> {
+    if [LogFormat::Auto, actual].contains(&spec.format) {
+        Ok(())
+    } else {
+        Err(other_format(spec, actual.name()))
     }
-    Err(FlightLogError::Values {
-        path: path.to_owned(),
-        problem: format!(
-            "flight.format is \"{}\" but the file is {}; remove the key",
-            format_name(spec.format),
-            format_name(actual)
-        ),
-    })
 }
 
-/// A warning if `flight.height` says other than the heights of the file, which are above mean sea level if
-/// `is_msl`.
-pub(super) fn height_note(what: &str, is_msl: bool, spec: &FlightSpec) -> Option<Note> {
-    let (stated, place, key) = if is_msl {
-        (HeightReference::Msl, "mean sea level", "msl")
-    } else {
-        (HeightReference::Ellipsoid, "the ellipsoid", "ellipsoid")
-    };
-    (spec.height != stated).then(|| Note {
-        is_warning: true,
-        text: format!(
-            "{what} are above {place}, flight.height says otherwise: set flight.height = \"{key}\""
-        ),
+/// Message for a file that is another one than `flight.format` says.
+pub(super) fn other_format(spec: &FlightSpec, actual: &str) -> String {
+    format!("flight.format is \"{}\" but the file is {actual}; remove the key", spec.format.name())
+}
+
+/// Names for messages.
+pub(super) fn listed(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// A warning that one of several instances is flown although the log does not say that the vehicle used it.
+pub(super) fn instance_note(name: &str, instances: &str, flown: u32) -> Note {
+    Note::warning(format!(
+        "`{name}` has the instances {instances}, and the log does not say which the vehicle used: {flown} is \
+            flown; set flight.topic = \"{name}#1\" for another"
+    ))
+}
+
+/// A warning if `flight.height` says other than the heights of the file.
+pub(super) fn height_note(what: &str, datum: HeightReference, spec: &FlightSpec) -> Option<Note> {
+    (spec.height != datum).then(|| {
+        Note::warning(format!(
+            "{what} are above {}, flight.height says otherwise: set flight.height = \"{}\"",
+            surface(datum),
+            datum.name()
+        ))
     })
 }
 

@@ -4,7 +4,6 @@
 use camsim_core::flight_log::Note;
 
 use super::{
-    column_selection::has_time_and_position,
     header::HeaderColumns,
     text_table::{HeaderLine, Line},
 };
@@ -21,7 +20,7 @@ pub(super) fn untag<'a>(lines: Vec<Line<'a>>) -> (Vec<Line<'a>>, Vec<HeaderLine<
         .collect();
     let names_position = |names: &str| {
         let names: Vec<&str> = names.split(',').map(str::trim).collect();
-        has_time_and_position(&HeaderColumns::parse(&names))
+        HeaderColumns::parse(&names).has_time_and_position()
     };
     let chosen = column_lines
         .iter()
@@ -46,9 +45,9 @@ pub(super) fn untag<'a>(lines: Vec<Line<'a>>) -> (Vec<Line<'a>>, Vec<HeaderLine<
             others += 1;
         }
     }
-    let note = Note {
-        is_warning: false,
-        text: format!("the {} lines `${tag}` are read, {others} lines of other kinds are not", rows.len()),
-    };
+    let note = Note::information(format!(
+        "the {} lines `${tag}` are read, {others} lines of other kinds are not",
+        rows.len()
+    ));
     (rows, headers, vec![note])
 }

@@ -90,12 +90,12 @@ fn auto_format_refuses_tables_that_fit_two_layouts() {
     let quaternion = "0,1,2,3,0,0,0,1\n1,1,2,3,0,0,0,1\n";
     for content in [metres, slow, one_row, still, quaternion] {
         let error = raw(content, LogFormat::Auto).unwrap_err();
-        assert!(matches!(error, FlightLogError::Ambiguous { .. }), "{content}: {error}");
+        assert!(matches!(error.problem, LogProblem::Ambiguous(_)), "{content}: {error}");
         assert!(error.to_string().contains("flight.format"), "{error}");
     }
     assert!(matches!(
         raw("0,1,2,3,4\n", LogFormat::Auto),
-        Err(FlightLogError::UnknownLayout { columns: 5, .. })
+        Err(FlightLogError { problem: LogProblem::UnknownLayout(5), .. })
     ));
     assert_eq!(raw(one_row, LogFormat::CsvLla).unwrap().len(), 1);
 }
@@ -131,12 +131,18 @@ fn tum_and_euroc_poses_are_converted_to_ned_and_frd() {
 #[test]
 fn malformed_files_are_refused_with_line_and_column() {
     let text = |result: Result<Vec<RawRow>, FlightLogError>| result.unwrap_err().to_string();
-    assert!(matches!(raw("", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
-    assert!(matches!(raw("# only words\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
-    assert!(matches!(raw("t,lat,lon,alt\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
+    assert!(matches!(raw("", LogFormat::Auto), Err(FlightLogError { problem: LogProblem::Empty, .. })));
+    assert!(matches!(
+        raw("# only words\n", LogFormat::Auto),
+        Err(FlightLogError { problem: LogProblem::Empty, .. })
+    ));
+    assert!(matches!(
+        raw("t,lat,lon,alt\n", LogFormat::Auto),
+        Err(FlightLogError { problem: LogProblem::Empty, .. })
+    ));
     assert!(matches!(
         raw_bytes(b"0,1\xff,2", LogFormat::Auto),
-        Err(FlightLogError::NotText { offset: 3, .. })
+        Err(FlightLogError { problem: LogProblem::NotText(3), .. })
     ));
     let error = text(raw(&LLA.replace("501", "5o1"), LogFormat::Auto));
     assert!(error.contains("line 2, column 4 (height): `5o1` is not a number"), "{error}");
@@ -265,7 +271,7 @@ fn published_flights_have_the_known_rows_and_repairs() {
     read("flights/rpng_neighborhood_01_gps.txt", LogFormat::Auto, AttitudeSource::Track).unwrap();
     assert!(matches!(
         read("flights/kitti_00_gt.txt", LogFormat::Auto, AttitudeSource::Log),
-        Err(FlightLogError::PoseMatrices { .. })
+        Err(FlightLogError { problem: LogProblem::PoseMatrices, .. })
     ));
     assert!(read("flights/kitti_00_gt_times.txt", LogFormat::Auto, AttitudeSource::Log).is_err());
 
@@ -276,7 +282,10 @@ fn published_flights_have_the_known_rows_and_repairs() {
         ("camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv", 60),
     ] {
         assert!(
-            matches!(read(file, LogFormat::Auto, AttitudeSource::Log), Err(FlightLogError::Ambiguous { .. })),
+            matches!(
+                read(file, LogFormat::Auto, AttitudeSource::Log),
+                Err(FlightLogError { problem: LogProblem::Ambiguous(_), .. })
+            ),
             "{file}"
         );
         let log = read(file, LogFormat::CsvNed, AttitudeSource::Log).unwrap();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use camsim_core::flight_log::Note;
 
-use super::{preamble, tagged_lines, time_fields};
+use super::{error::LogProblem, preamble, tagged_lines, time_fields};
 
 /// Lines that are sampled to detect the separator.
 const SAMPLE_LINES: usize = 32;
@@ -60,6 +60,20 @@ impl Separator {
             Self::Space => fields.extend(line.split_whitespace()),
             _ => fields.extend(line.split(self.character()).map(str::trim)),
         }
+    }
+
+    /// The field of a column of a line; empty where the line is too short.
+    fn field(self, line: &str, column: usize) -> &str {
+        let field = match self {
+            _ if line.contains('"') => {
+                let mut fields = Vec::new();
+                self.split_quoted(line, &mut fields);
+                fields.get(column).copied()
+            }
+            Self::Space => line.split_whitespace().nth(column),
+            _ => line.split(self.character()).nth(column).map(str::trim),
+        };
+        field.unwrap_or("")
     }
 
     fn split_quoted<'a>(self, line: &'a str, fields: &mut Vec<&'a str>) {
@@ -149,9 +163,26 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
+    /// The table of a text that has rows.
+    ///
+    /// # Errors
+    /// There are no rows of data.
+    pub(super) fn with_rows(content: &'a str) -> Result<Self, LogProblem> {
+        let table = Self::new(content);
+        let lines = table.headers.len();
+        // One comment or two are a file without data, not data behind marks.
+        if table.rows.is_empty() && lines > 2 && table.headers.iter().all(|line| line.is_comment) {
+            return Err(LogProblem::Content(format!(
+                "all {lines} lines begin with # or %, so all are comments: remove these marks from the lines \
+                    of data"
+            )));
+        }
+        if table.rows.is_empty() { Err(LogProblem::Empty) } else { Ok(table) }
+    }
+
     /// Detects separator, headers, width and decimal commas of a text.
     // Long because each step needs the results of the one before.
-    pub(super) fn new(content: &'a str) -> Self {
+    fn new(content: &'a str) -> Self {
         // Files of classic Mac OS end lines with a carriage return alone.
         let has_cr_only = !content.contains('\n');
         let texts: Box<dyn Iterator<Item = &'a str>> =
@@ -231,6 +262,16 @@ impl<'a> Table<'a> {
         fields
     }
 
+    /// The field of a row; empty where the row is too short.
+    pub(super) fn field(&self, row: &Line<'a>, column: usize) -> &'a str {
+        self.separator.field(row.text, column)
+    }
+
+    /// The fields of a column.
+    pub(super) fn column(&self, column: usize) -> impl Iterator<Item = &'a str> + Clone {
+        self.rows.iter().map(move |row| self.field(row, column))
+    }
+
     /// Splits a header line into names, by the separator of the rows or by another one that gives as many
     /// names as there are columns.
     pub(super) fn names(&self, text: &'a str) -> Vec<&'a str> {
@@ -278,8 +319,14 @@ impl<'a> Table<'a> {
 
     /// The first number of a column.
     pub(super) fn first_number(&self, column: usize) -> Option<f64> {
-        let field = |row| self.fields(row).get(column).and_then(|field| self.number(field));
-        self.rows.iter().filter_map(field).find(|value| value.is_finite())
+        self.column(column).filter_map(|field| self.number(field)).find(|value| value.is_finite())
+    }
+
+    /// The table of those rows that are kept.
+    pub(super) fn with_rows_kept(mut self, keeps: &[bool]) -> Self {
+        let mut keeps = keeps.iter();
+        self.rows.retain(|_| keeps.next() != Some(&false));
+        self
     }
 
     /// Up to `count` rows, evenly spaced over the file.

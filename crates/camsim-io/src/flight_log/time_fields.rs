@@ -19,6 +19,14 @@ pub(super) enum TimeFormat {
     DateTime,
 }
 
+/// What the times of a table are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Clock {
+    pub(super) format: TimeFormat,
+    /// Whether dates have been added to clock times.
+    pub(super) has_dates: bool,
+}
+
 impl TimeFormat {
     /// The format of a field; `None` if the field is empty.
     pub(super) fn detect(field: &str) -> Option<Self> {

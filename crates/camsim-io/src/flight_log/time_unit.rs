@@ -9,8 +9,8 @@ use camsim_core::{
 use super::{
     columns::Frame,
     layout::TableLayout,
-    rows::ParsedRows,
-    time_fields::{self, TimeFormat},
+    rows::{ParsedRow, ParsedRows},
+    time_fields::{self, Clock, TimeFormat},
     units::{HOUR, MICROSECOND, MILLISECOND, MINUTE, NANOSECOND, SECOND, Unit},
 };
 use crate::median::median;
@@ -65,26 +65,35 @@ struct Motion {
     is_geodetic: bool,
 }
 
-/// Nanoseconds per unit of the time column.
+/// The rows with their times in nanoseconds, and what these are.
 ///
 /// # Errors
 /// The key contradicts the header, or the unit is not known: the error message.
-pub(super) fn time_unit_ns(
-    rows: &ParsedRows,
+pub(super) fn in_nanoseconds(
+    mut parsed: ParsedRows,
+    layout: &TableLayout,
+    spec: &FlightSpec,
+    notes: &mut Vec<Note>,
+) -> Result<(Clock, Vec<ParsedRow>), String> {
+    if parsed.clock.format == TimeFormat::Number {
+        let unit_ns = unit_ns(&parsed.rows, layout, spec, notes)?;
+        for row in &mut parsed.rows {
+            row.time = row.time.and_then(|time| time_fields::to_ns(time, unit_ns)).map(i128::from);
+        }
+    } else if spec.time_unit != TimeUnit::Auto {
+        notes.push(Note::warning("flight.time_unit is not used: the times are clock times or dates"));
+    }
+    Ok((parsed.clock, parsed.rows))
+}
+
+/// Nanoseconds per unit of the time column.
+fn unit_ns(
+    rows: &[ParsedRow],
     layout: &TableLayout,
     spec: &FlightSpec,
     notes: &mut Vec<Note>,
 ) -> Result<f64, String> {
     let key = unit_of_key(spec.time_unit);
-    if rows.time_format != TimeFormat::Number {
-        if key.is_some() {
-            notes.push(Note {
-                is_warning: true,
-                text: "flight.time_unit is not used: the times are clock times or dates".to_owned(),
-            });
-        }
-        return Ok(1.0);
-    }
     if let Some(named_ns) = layout.time.unit_ns {
         return match key {
             Some(unit) if unit.factor != named_ns => Err(format!(
@@ -128,17 +137,17 @@ pub(super) fn time_unit_ns(
 fn warn_if_implausible(motion: &Motion, unit_ns: f64, origin: &str, notes: &mut Vec<Note>) {
     let scaled = motion.scaled(unit_ns);
     if !scaled.is_plausible() {
-        notes.push(Note {
-            is_warning: true,
-            text: format!("in {origin} unit of time there are {}: check it", scaled.describe()),
-        });
+        notes.push(Note::warning(format!(
+            "in {origin} unit of time there are {}: check it",
+            scaled.describe()
+        )));
     }
 }
 
 /// Whether the numbers are clock times `hhmmss`: no seconds or minutes of 60 and more, and steps that carry
 /// from 59 to 100.
-fn look_like_hhmmss(rows: &ParsedRows, motion: &Motion) -> bool {
-    let times: Vec<f64> = rows.rows.iter().filter_map(|row| row.time).map(time_fields::to_units).collect();
+fn look_like_hhmmss(rows: &[ParsedRow], motion: &Motion) -> bool {
+    let times: Vec<f64> = rows.iter().filter_map(|row| row.time).map(time_fields::to_units).collect();
     let is_clock = |time: f64| {
         (0.0..240_000.0).contains(&time) && time % 100.0 < 60.0 && (time / 100.0).floor() % 100.0 < 60.0
     };
@@ -192,7 +201,7 @@ fn infer_unit_ns(motion: &Motion, notes: &mut Vec<Note>) -> Result<f64, String> 
             "the times are read as {}: their column names no unit, and {reason}; flight.time_unit decides",
             unit.name
         );
-        notes.push(Note { is_warning: true, text });
+        notes.push(Note::warning(text));
         Ok(unit.factor)
     };
     if let Some(unit) = as_date.filter(|unit| is_impossible && motion.scaled(unit.factor).is_plausible()) {
@@ -267,13 +276,13 @@ impl Motion {
 }
 
 /// Measures times and mean speed of a log.
-fn motion(rows: &ParsedRows, layout: &TableLayout) -> Motion {
-    let times: Vec<f64> = rows.rows.iter().filter_map(|row| row.time).map(time_fields::to_units).collect();
+fn motion(rows: &[ParsedRow], layout: &TableLayout) -> Motion {
+    let times: Vec<f64> = rows.iter().filter_map(|row| row.time).map(time_fields::to_units).collect();
     let mut largest = 0.0_f64;
     for time in &times {
         largest = largest.max(time.abs());
     }
-    let is_integer = rows.rows.iter().filter_map(|row| row.time).all(time_fields::is_integer);
+    let is_integer = rows.iter().filter_map(|row| row.time).all(time_fields::is_integer);
     let mut steps: Vec<f64> =
         times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     let step = median(&mut steps, f64::total_cmp);
@@ -281,7 +290,7 @@ fn motion(rows: &ParsedRows, layout: &TableLayout) -> Motion {
     let geodetic = layout.frame == Frame::Geodetic;
     // A latitude or longitude of exactly 0 is written by receivers without a fix.
     let is_null = |position: &[f64; 3]| geodetic && (position[0] == 0.0 || position[1] == 0.0);
-    let fixes = rows.rows.iter().filter(|row| row.has_position() && !is_null(&row.position));
+    let fixes = rows.iter().filter(|row| row.has_position() && !is_null(&row.position));
     let fixes: Vec<(f64, [f64; 3])> =
         fixes.filter_map(|row| row.time.map(|time| (time_fields::to_units(time), row.position))).collect();
     let mut moves: Vec<(f64, f64)> = fixes

@@ -12,18 +12,16 @@
 //! several instances that of the estimator which flew is taken (`instances`).
 //! Times are `timestamp_sample` where a topic has it, else `timestamp`, in microseconds since the start.
 
-use std::path::Path;
-
 use camsim_core::{
     flight_log::Note,
-    scenario::{AttitudeSource, FlightSpec, LogFormat},
+    scenario::{AttitudeSource, FlightSpec},
 };
 
 use super::{
-    FlightLogError, RawLog,
+    RawLog,
     columns::{AttitudeKind, Frame},
     rows::ParsedRow,
-    streams::{self, Stream, Streams},
+    streams::{self, Stream, Streams, listed},
     unused_keys::unused_height_note,
 };
 
@@ -50,26 +48,23 @@ const POSITIONS: [&str; 7] = [
 ///
 /// # Errors
 /// The file is no ULog, or has no positions, or not those that `flight.topic` names.
-pub(super) fn read(path: &Path, bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
-    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
-    streams::check_format(path, spec, LogFormat::Ulog)?;
-    let file = UlogFile::parse(bytes).map_err(problem)?;
-    let mut notes: Vec<Note> =
-        file.damage.iter().map(|text| Note { is_warning: true, text: text.clone() }).collect();
+pub(super) fn read(bytes: &[u8], spec: &FlightSpec) -> Result<RawLog, String> {
+    let file = UlogFile::parse(bytes)?;
+    let mut notes: Vec<Note> = file.damage.iter().map(Note::warning).collect();
     notes.extend(unused_height_note(spec));
     let (position_name, attitude_name) = streams::named_topics(spec);
-    let (topic, reader, position) = positions(&file, position_name, spec, &mut notes).map_err(problem)?;
+    let (topic, reader, position) = positions(&file, position_name, spec, &mut notes)?;
     let attitude = if spec.attitude == AttitudeSource::Track || reader.quaternion.is_some() {
         None
     } else {
-        attitude_stream(&file, &topic, attitude_name, &mut notes).map_err(problem)?
+        attitude_stream(&file, &topic, attitude_name, &mut notes)?
     };
     let kind = match (&attitude, reader.quaternion) {
         (None, None) => AttitudeKind::None,
         _ => AttitudeKind::Quaternion,
     };
     let frame = if reader.is_geodetic() { Frame::Geodetic } else { Frame::NorthEastDown };
-    Streams { frame, kind, position, attitude, notes }.into_log(path, spec)
+    Streams { frame, kind, position, attitude, notes }.into_log(spec)
 }
 
 /// The positions to fly: of the topic that `flight.topic` names, else of the first with valid ones.
@@ -94,7 +89,7 @@ fn positions<'a>(
             notes.extend(its_notes);
             return Ok((topic.clone(), reader, stream));
         }
-        notes.push(Note { is_warning: true, text: format!("`{}` has no valid position", full_name(topic)) });
+        notes.push(Note::warning(format!("`{}` has no valid position", full_name(topic))));
     }
     Err(match (name, candidates.is_empty(), all.is_empty()) {
         (Some(name), true, _) => {
@@ -120,10 +115,6 @@ fn positions<'a>(
         }
         (None, true, false) => format!("flight.topic must name the positions to fly: {}", listed(&all)),
     })
-}
-
-fn listed(names: &[String]) -> String {
-    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// The attitudes that belong to a topic of positions, or those that `flight.topic` names.

@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use camsim_core::flight_log::Note;
 
 use super::{
+    super::streams,
     file::{Column, DataflashFile, Message},
     time_reader,
 };
@@ -97,13 +98,7 @@ pub(super) fn select<'a>(
         let flown =
             all.iter().filter(|one| has_fix(&parts[one.part], one.record)).map(|one| one.instance).min();
         let flown = flown.unwrap_or(lowest);
-        notes.push(Note {
-            is_warning: true,
-            text: format!(
-                "`{name}` has the instances {list}, and the log does not say which the vehicle used: {flown} is \
-                    flown; set flight.topic = \"{name}#1\" for another"
-            ),
-        });
+        notes.push(streams::instance_note(&name, &list, flown));
         all.retain(|selected| selected.instance == flown);
         return Ok(all);
     };

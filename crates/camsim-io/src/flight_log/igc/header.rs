@@ -9,30 +9,28 @@
 //! | `TZN` | not applied: fixes are in UTC |
 //! | `UNT` | a warning if it names feet: `B` records are in metres |
 
-use camsim_core::flight_log::Note;
+use camsim_core::{flight_log::Note, scenario::HeightReference};
 
 use super::super::time_fields;
 
-/// What satellite heights are above.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum GnssHeight {
-    /// The ellipsoid, also where the record does not say so.
-    #[default]
-    Ellipsoid,
-    MeanSeaLevel,
-    /// The record says that it does not know.
-    Unknown,
-}
-
 /// Statements of the header.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Header {
     /// Nanoseconds from 1970 to the last date.
     pub(super) day_ns: Option<i128>,
-    pub(super) gnss_height: GnssHeight,
+    /// What satellite heights are above, the ellipsoid unless the record says otherwise; `None` if it says that
+    /// it does not know.
+    pub(super) gnss_height: Option<HeightReference>,
     /// Line and text of a setting of pressure heights other than the standard atmosphere.
     pub(super) pressure: Option<(usize, String)>,
     pub(super) notes: Vec<Note>,
+}
+
+impl Default for Header {
+    fn default() -> Self {
+        let gnss_height = Some(HeightReference::Ellipsoid);
+        Self { day_ns: None, gnss_height, pressure: None, notes: Vec::new() }
+    }
 }
 
 /// Subject, as `DTM`, and what stands behind it, of a record such as `HFDTM100GPSDATUM:WGS-1984`.
@@ -118,11 +116,11 @@ impl Header {
         let value = strip(letters, "ALTGPS");
         let has = |words: &[&str]| words.iter().any(|word| value.contains(word));
         if value.is_empty() || has(&["ELL", "WGS", "HAE"]) {
-            self.gnss_height = GnssHeight::Ellipsoid;
+            self.gnss_height = Some(HeightReference::Ellipsoid);
         } else if has(&["GEO", "MSL", "EGM", "SEALEVEL"]) {
-            self.gnss_height = GnssHeight::MeanSeaLevel;
+            self.gnss_height = Some(HeightReference::Msl);
         } else {
-            self.gnss_height = GnssHeight::Unknown;
+            self.gnss_height = None;
             let text = format!(
                 "line {number}: `{line}` does not say what satellite heights are above (ELL or GEO): they are taken \
                     as flight.height says"
@@ -239,12 +237,12 @@ mod tests {
             header.read(line, 1).unwrap_or_default();
             (header.gnss_height, header.notes.len(), header.pressure.is_some())
         };
-        assert_eq!(of("HFALGALTGPS:ELL"), (GnssHeight::Ellipsoid, 0, false));
-        assert_eq!(of("HFALG ALTGPS: GEOID"), (GnssHeight::MeanSeaLevel, 0, false));
-        assert_eq!(of("HFALGALTGPS:GEO"), (GnssHeight::MeanSeaLevel, 0, false));
-        assert_eq!(of("HFALGALTGPS:NKN"), (GnssHeight::Unknown, 1, false));
-        assert_eq!(of("HFALPALTPRESSURE:ISA"), (GnssHeight::Ellipsoid, 0, false));
-        assert_eq!(of("HFALPALTPRESSURE:QNH 1021"), (GnssHeight::Ellipsoid, 0, true));
-        assert_eq!(of("HFTZNTIMEZONE:2.0"), (GnssHeight::Ellipsoid, 1, false));
+        assert_eq!(of("HFALGALTGPS:ELL"), (Some(HeightReference::Ellipsoid), 0, false));
+        assert_eq!(of("HFALG ALTGPS: GEOID"), (Some(HeightReference::Msl), 0, false));
+        assert_eq!(of("HFALGALTGPS:GEO"), (Some(HeightReference::Msl), 0, false));
+        assert_eq!(of("HFALGALTGPS:NKN"), (None, 1, false));
+        assert_eq!(of("HFALPALTPRESSURE:ISA"), (Some(HeightReference::Ellipsoid), 0, false));
+        assert_eq!(of("HFALPALTPRESSURE:QNH 1021"), (Some(HeightReference::Ellipsoid), 0, true));
+        assert_eq!(of("HFTZNTIMEZONE:2.0"), (Some(HeightReference::Ellipsoid), 1, false));
     }
 }

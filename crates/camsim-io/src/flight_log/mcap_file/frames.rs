@@ -220,7 +220,7 @@ fn states_world(name: &str) -> bool {
 
 /// Warns of a world that is none, and refuses one in which positions are no flight.
 fn check_world(topic: &str, frame: &str, notes: &mut Vec<Note>) -> Result<(), String> {
-    let mut warn = |text: String| notes.push(Note { is_warning: true, text });
+    let mut warn = |text: String| notes.push(Note::warning(text));
     if is_geocentric(frame) {
         return Err(format!(
             "`{topic}` is in the frame `{frame}`, whose positions are geocentric (REP 105): choose a topic of \
@@ -270,29 +270,24 @@ fn axes_note(
         format!("world {}, body {}", named(frame), named(body))
     };
     if let Some(which) = inferred {
-        return Some(Note {
-            is_warning: true,
-            text: format!(
-                "`{topic}` ({names}): {which} is read as {}, because the vehicle is upside down otherwise: the \
+        return Some(Note::warning(format!(
+            "`{topic}` ({names}): {which} is read as {}, because the vehicle is upside down otherwise: the \
                     names should say so (`odom_ned`, `base_link_frd`)",
-                if which == "its body" { &body_words } else { &world_words }
-            ),
-        });
+            if which == "its body" { &body_words } else { &world_words }
+        )));
     }
     if body_axes == OPTICAL {
-        return Some(Note {
-            is_warning: true,
-            text: format!(
-                "`{topic}`: the poses are those of the optical frame {} (x right, y down, z forward), turned to \
+        return Some(Note::warning(format!(
+            "`{topic}`: the poses are those of the optical frame {} (x right, y down, z forward), turned to \
                     a body that looks along z: camera.mount counts from there",
-                named(body)
-            ),
-        });
+            named(body)
+        )));
     }
     let is_usual = (world_axes, body_axes) == (USUAL_WORLD, USUAL_BODY);
-    (!is_usual).then(|| Note {
-        is_warning: false,
-        text: format!("`{topic}` ({names}): read as {world_words} and {body_words}, as the names say"),
+    (!is_usual).then(|| {
+        Note::information(format!(
+            "`{topic}` ({names}): read as {world_words} and {body_words}, as the names say"
+        ))
     })
 }
 

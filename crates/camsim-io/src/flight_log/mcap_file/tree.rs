@@ -168,7 +168,7 @@ impl Tree {
                 "`{topic}` is composed to the root of its transforms, in time: {}",
                 way.iter().rev().map(String::as_str).collect::<Vec<_>>().join(" -> ")
             );
-            notes.push(Note { is_warning: false, text });
+            notes.push(Note::information(text));
         }
         let outside = outside.into_iter().filter(|outside| *outside).count();
         if outside > 0 {
@@ -176,7 +176,7 @@ impl Tree {
                 "{outside} poses of `{topic}` are before the first or after the last transform of a frame \
                     above: that nearest in time counts"
             );
-            notes.push(Note { is_warning: true, text });
+            notes.push(Note::warning(text));
         }
         Ok(())
     }
@@ -197,7 +197,7 @@ impl Tree {
         };
         let text =
             format!("`{topic}` is in the frame `{frame}`, whose pose in `{parent}` is not applied{advice}");
-        Some(Note { is_warning: true, text })
+        Some(Note::warning(text))
     }
 
     /// A note that the body of a topic is mounted in another one; a warning if it is turned there.

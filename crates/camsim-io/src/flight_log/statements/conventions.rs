@@ -8,12 +8,11 @@ use camsim_core::{
 use super::{
     super::{
         column_meaning::ColumnMeaning,
-        column_selection::push_information,
         columns::{AttitudeColumns, AttitudeKind, Frame},
         layout::TableLayout,
         text_table::HeaderLine,
-        units::VerticalDatum,
-        xml_prose::DATUMS,
+        word_list::has_word,
+        xml::DATUMS,
     },
     Doubt, meaning_of,
 };
@@ -53,210 +52,87 @@ enum Convention {
 
 use Convention::*;
 
-/// Phrases, as words of letters and digits, with what they name.
-const PHRASES: &[(Convention, &[&str])] = &[
+/// What phrases name, as words of letters and digits, with commas between phrases.
+const PHRASES: &[(Convention, &str)] = &[
     (
         MeanSeaLevel,
-        &[
-            "msl",
-            "amsl",
-            "asl",
-            "sea level",
-            "orthometric",
-            "above geoid",
-            "above the geoid",
-            "egm96",
-            "egm2008",
-            "navd88",
-        ],
+        "msl, amsl, asl, sea level, orthometric, above geoid, above the geoid, egm96, egm2008, navd88",
     ),
     (
         Ellipsoid,
-        &[
-            "hae",
-            "ellipsoidal height",
-            "ellipsoidal heights",
-            "ellipsoid height",
-            "ellipsoid heights",
-            "above ellipsoid",
-            "above the ellipsoid",
-            "above wgs84",
-            "above wgs 84",
-            "above the wgs84",
-            "above the wgs 84",
-            "height wgs84 ellipsoid",
-            "heights ellipsoidal",
-            "height ellipsoidal",
-        ],
+        "hae, ellipsoidal height, ellipsoidal heights, ellipsoid height, ellipsoid heights, \
+            above ellipsoid, above the ellipsoid, above wgs84, above wgs 84, above the wgs84, \
+            above the wgs 84, height wgs84 ellipsoid, heights ellipsoidal, height ellipsoidal",
     ),
     (
         AboveGround,
-        &[
-            "agl",
-            "above ground",
-            "above takeoff",
-            "above take off",
-            "above home",
-            "relative to home",
-            "relative to takeoff",
-            "relative to take off",
-            "relative to ground",
-            "above launch",
-        ],
+        "agl, above ground, above takeoff, above take off, above home, relative to home, \
+            relative to takeoff, relative to take off, relative to ground, above launch",
     ),
     (
         AirPressure,
-        &[
-            "pressure altitude",
-            "pressure altitudes",
-            "barometric altitude",
-            "barometric altitudes",
-            "barometric height",
-            "barometric heights",
-            "flight levels",
-            "qnh",
-            "qfe",
-            "qne",
-        ],
+        "pressure altitude, pressure altitudes, barometric altitude, barometric altitudes, \
+            barometric height, barometric heights, flight levels, qnh, qfe, qne",
     ),
-    (NorthEastDown, &["ned", "north east down"]),
-    (EastNorthUp, &["enu", "east north up"]),
-    (OtherWorld, &["nwu", "north west up", "ecef", "eun", "esu", "wnd", "earth centred", "earth centered"]),
-    (ForwardRightDown, &["frd", "forward right down", "front right down", "fwd right down"]),
-    (ForwardLeftUp, &["flu", "forward left up", "front left up", "fwd left up"]),
-    (OtherBody, &["rdf", "right down forward", "optical frame", "camera frame", "rub", "opengl", "opencv"]),
-    (ScalarFirst, &["wxyz", "w x y z", "qw qx qy qz", "w first", "scalar first", "real part first"]),
-    (ScalarLast, &["xyzw", "x y z w", "qx qy qz qw", "w last", "scalar last", "real part last"]),
+    (NorthEastDown, "ned, north east down"),
+    (EastNorthUp, "enu, east north up"),
+    (OtherWorld, "nwu, north west up, ecef, eun, esu, wnd, earth centred, earth centered"),
+    (ForwardRightDown, "frd, forward right down, front right down, fwd right down"),
+    (ForwardLeftUp, "flu, forward left up, front left up, fwd left up"),
+    (OtherBody, "rdf, right down forward, optical frame, camera frame, rub, opengl, opencv"),
+    (ScalarFirst, "wxyz, w x y z, qw qx qy qz, w first, scalar first, real part first"),
+    (ScalarLast, "xyzw, x y z w, qx qy qz qw, w last, scalar last, real part last"),
     (
         WorldToBody,
-        &[
-            "world to body",
-            "world to camera",
-            "world to cam",
-            "w2c",
-            "w2b",
-            "body from world",
-            "camera from world",
-            "global to body",
-            "ned to body",
-            "enu to body",
-            "map to body",
-        ],
+        "world to body, world to camera, world to cam, w2c, w2b, body from world, camera from world, \
+            global to body, ned to body, enu to body, map to body",
     ),
-    (MagneticNorth, &["magnetic"]),
+    (MagneticNorth, "magnetic"),
     (
         CounterClockwise,
-        &[
-            "counter clockwise",
-            "counterclockwise",
-            "anticlockwise",
-            "anti clockwise",
-            "ccw",
-            "yaw from east",
-            "heading from east",
-        ],
+        "counter clockwise, counterclockwise, anticlockwise, anti clockwise, ccw, yaw from east, \
+            heading from east",
     ),
-    (LeftHanded, &["left handed", "left hand"]),
-    (VerticalY, &["y up", "y down", "y vertical"]),
-    (ZUp, &["z up", "z upward", "z upwards"]),
-    (ZDown, &["z down", "z downward", "z downwards"]),
-    (XNorth, &["x north"]),
-    (XEast, &["x east"]),
-    (Imperial, &["imperial", "us customary"]),
-    (Jpl, &["jpl", "shuster"]),
+    (LeftHanded, "left handed, left hand"),
+    (VerticalY, "y up, y down, y vertical"),
+    (ZUp, "z up, z upward, z upwards"),
+    (ZDown, "z down, z downward, z downwards"),
+    (XNorth, "x north"),
+    (XEast, "x east"),
+    (Imperial, "imperial, us customary"),
+    (Jpl, "jpl, shuster"),
     (
         PitchDown,
-        &[
-            "positive nose down",
-            "nose down positive",
-            "nose down is positive",
-            "negative nose up",
-            "nose up negative",
-            "pitch positive down",
-            "pitch positive downward",
-            "pitch positive downwards",
-            "positive pitch down",
-            "positive pitch nose down",
-        ],
+        "positive nose down, nose down positive, nose down is positive, negative nose up, nose up negative, \
+            pitch positive down, pitch positive downward, pitch positive downwards, positive pitch down, \
+            positive pitch nose down",
     ),
     (
         HeightDown,
-        &[
-            "altitude positive down",
-            "altitude negative down",
-            "altitude negative up",
-            "altitude positive downward",
-            "altitude positive downwards",
-            "altitudes positive down",
-            "altitudes negative down",
-            "alt positive down",
-            "alt negative down",
-            "alt negative up",
-            "height positive down",
-            "height negative down",
-            "height negative up",
-            "heights positive down",
-            "heights negative down",
-            "heights negative up",
-            "positive down altitude",
-            "positive down height",
-        ],
+        "altitude positive down, altitude negative down, altitude negative up, altitude positive downward, \
+            altitude positive downwards, altitudes positive down, altitudes negative down, \
+            alt positive down, alt negative down, alt negative up, height positive down, \
+            height negative down, height negative up, heights positive down, heights negative down, \
+            heights negative up, positive down altitude, positive down height",
     ),
     (
         WestOrSouth,
-        &[
-            "positive west",
-            "positive westward",
-            "positive westwards",
-            "west positive",
-            "west longitude positive",
-            "west longitudes positive",
-            "negative east",
-            "east negative",
-            "positive south",
-            "positive southward",
-            "positive southwards",
-            "south positive",
-            "south latitude positive",
-            "south latitudes positive",
-            "negative north",
-            "north negative",
-        ],
+        "positive west, positive westward, positive westwards, west positive, west longitude positive, \
+            west longitudes positive, negative east, east negative, positive south, positive southward, \
+            positive southwards, south positive, south latitude positive, south latitudes positive, \
+            negative north, north negative",
     ),
     (
         EulerOrder,
-        &[
-            "euler order",
-            "euler sequence",
-            "euler convention",
-            "rotation order",
-            "rotation sequence",
-            "order of rotation",
-            "order of rotations",
-            "order of angles",
-            "angle order",
-            "angles order",
-            "euler xyz",
-            "euler angles xyz",
-            "xyz euler",
-            "roll first",
-        ],
+        "euler order, euler sequence, euler convention, rotation order, rotation sequence, \
+            order of rotation, order of rotations, order of angles, angle order, angles order, euler xyz, \
+            euler angles xyz, xyz euler, roll first",
     ),
     (
         OtherPoint,
-        &[
-            "position of camera",
-            "positions of camera",
-            "camera position",
-            "camera positions",
-            "position of antenna",
-            "positions of antenna",
-            "antenna position",
-            "antenna positions",
-            "position of antenna phase center",
-            "position of lidar",
-            "positions of lidar",
-        ],
+        "position of camera, positions of camera, camera position, camera positions, position of antenna, \
+            positions of antenna, antenna position, antenna positions, position of antenna phase center, \
+            position of lidar, positions of lidar",
     ),
 ];
 
@@ -286,48 +162,33 @@ pub(super) fn apply(
 
 /// The conventions that a line names.
 fn find(line: &str) -> Vec<Convention> {
-    const FILLERS: [&str; 10] =
-        ["is", "are", "axis", "axes", "points", "pointing", "to", "towards", "the", "as"];
+    const FILLERS: &str = "is are axis axes points pointing to towards the as";
+    const MOTIONS: &str = "velocity velocities vel speed acceleration accelerations gyro";
+    const STATES: &str = "position positions attitude orientation pose poses quaternion height heights \
+        altitude altitudes";
     let lower = line.to_lowercase();
     let words: Vec<&str> =
         lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let joined = |words: &[&str]| format!(" {} ", words.join(" "));
     let plain = joined(&words);
-    let short: Vec<&str> = words.iter().copied().filter(|word| !FILLERS.contains(word)).collect();
+    let short: Vec<&str> = words.iter().copied().filter(|word| !has_word(FILLERS, word)).collect();
     let unsigned: Vec<&str> = short.iter().copied().filter(|word| *word != "positive").collect();
     let (short, unsigned) = (joined(&short), joined(&unsigned));
+    let contains = |list: &str| words.iter().any(|word| has_word(list, word));
     // `velocity in ENU` does not concern positions.
-    let is_of_motion = ["velocity", "velocities", "vel", "speed", "acceleration", "accelerations", "gyro"]
-        .iter()
-        .any(|word| words.contains(word))
-        && ![
-            "position",
-            "positions",
-            "attitude",
-            "orientation",
-            "pose",
-            "poses",
-            "quaternion",
-            "height",
-            "heights",
-            "altitude",
-            "altitudes",
-        ]
-        .iter()
-        .any(|word| words.contains(word));
+    let is_of_motion = contains(MOTIONS) && !contains(STATES);
     if is_of_motion {
         return Vec::new();
     }
-    let has = |phrase: &&str| {
+    let has = |phrase: &str| {
         let phrase = format!(" {phrase} ");
         plain.contains(&phrase) || short.contains(&phrase) || unsigned.contains(&phrase)
     };
-    let named = PHRASES.iter().filter(|(_, phrases)| phrases.iter().any(has));
+    let named = PHRASES.iter().filter(|(_, phrases)| phrases.split(", ").any(has));
     let mut found: Vec<Convention> = named.map(|(convention, _)| *convention).collect();
-    let contains = |list: &[&str]| list.iter().any(|word| words.contains(word));
     found.retain(|convention| match convention {
         // `Magnetic declination: 3 deg (applied)`
-        MagneticNorth => !contains(&["applied", "corrected", "removed"]),
+        MagneticNorth => !contains("applied corrected removed"),
         AboveGround => !is_height_of_other(&words),
         // `nose up positive, nose down negative`
         PitchDown | WestOrSouth if lower.contains(',') => {
@@ -337,14 +198,13 @@ fn find(line: &str) -> Vec<Convention> {
         _ => true,
     });
     // An ellipsoid alone is a part of any geodetic datum; that of heights is a statement.
-    let is_vertical =
-        contains(&["height", "heights", "altitude", "altitudes", "alt", "vertical", "elevation", "h"]);
-    if is_vertical && contains(&["ellipsoid", "ellipsoidal"]) && !found.contains(&Ellipsoid) {
+    let is_vertical = contains("height heights altitude altitudes alt vertical elevation h");
+    if is_vertical && contains("ellipsoid ellipsoidal") && !found.contains(&Ellipsoid) {
         found.push(Ellipsoid);
     }
     if is_vertical
-        && contains(&["geoid"])
-        && !contains(&["undulation", "separation"])
+        && contains("geoid")
+        && !contains("undulation separation")
         && !found.contains(&MeanSeaLevel)
     {
         found.push(MeanSeaLevel);
@@ -387,117 +247,110 @@ fn apply_order(layout: &mut TableLayout, is_scalar_first: bool, line: usize, not
     for (name, order) in layout.names.iter_mut().skip(4).zip(names) {
         order.clone_into(name);
     }
-    push_information(notes, format!("line {line} states the order of the quaternions: {}", names.join(", ")));
+    notes.push(Note::information(format!(
+        "line {line} states the order of the quaternions: {}",
+        names.join(", ")
+    )));
 }
 
 /// How the table is read, and what to do, where that differs from a convention; `None` where it agrees or the
 /// convention concerns nothing that is read.
 // Long because it is one table of cases.
 fn difference(convention: Convention, layout: &TableLayout, spec: &FlightSpec) -> Option<String> {
-    let is_geodetic = layout.frame == Frame::Geodetic;
-    let kind = layout.attitude.kind();
-    let has_attitude = kind != AttitudeKind::None;
-    let is_local = !is_geodetic;
-    let up = match layout.frame {
-        Frame::NorthEastDown => "down",
-        _ => "up",
+    let frame = layout.frame;
+    let is_geodetic = frame == Frame::Geodetic;
+    let (is_euler, is_quaternion) = match layout.attitude.kind() {
+        AttitudeKind::None => (false, false),
+        AttitudeKind::Euler => (true, false),
+        AttitudeKind::Quaternion => (false, true),
     };
-    let axes = match layout.frame {
+    let has_attitude = is_euler || is_quaternion;
+    let axes = match frame {
         Frame::Geodetic => "attitudes are read as turning a forward-right-down body to north-east-down",
         Frame::NorthEastUp => "positions are read as north, east, up",
         Frame::NorthEastDown => "positions are read as north, east, down, bodies as forward-right-down",
         Frame::EastNorthUp => "positions are read as x east, y north, z up, bodies as forward-left-up",
     };
-    let fix = "convert them, or name the columns or set flight.format to say so";
-    let world = |agrees: bool| (!agrees).then(|| format!("{axes}: {fix}"));
+    let turned = format!("{axes}: convert them, or name the columns or set flight.format to say so");
+    let mounted = format!("{axes}: camera.mount turns the camera in that body");
     let height = meaning_of(layout, layout.position[2].column);
-    let datum = |stated: VerticalDatum| {
-        if !is_geodetic {
-            return None;
+    let (differs, reason) = match convention {
+        MeanSeaLevel | Ellipsoid if !is_geodetic => return None,
+        MeanSeaLevel => return other_height(HeightReference::Msl, height, spec),
+        Ellipsoid => return other_height(HeightReference::Ellipsoid, height, spec),
+        AboveGround => {
+            (is_geodetic, "heights are read as above what flight.height says: add the height of the ground")
         }
-        let key = match spec.height {
-            HeightReference::Msl => VerticalDatum::MeanSeaLevel,
-            HeightReference::Ellipsoid => VerticalDatum::Ellipsoid,
-        };
-        let name = |datum| if datum == VerticalDatum::Ellipsoid { "ellipsoid" } else { "msl" };
-        let named = match height {
-            Some(ColumnMeaning::Height(datum)) => datum,
-            _ => None,
-        };
-        match named {
-            Some(named) if named != stated => {
-                Some("the name of the column says otherwise, and counts".to_owned())
-            }
-            // The names are compared with the key where the column is chosen.
-            Some(_) => None,
-            None if stated == key => None,
-            None => Some(format!(
-                "flight.height says \"{}\": set flight.height = \"{}\" if the line is about the heights",
-                name(key),
-                name(stated)
-            )),
-        }
-    };
-    match convention {
-        MeanSeaLevel => datum(VerticalDatum::MeanSeaLevel),
-        Ellipsoid => datum(VerticalDatum::Ellipsoid),
-        AboveGround => is_geodetic.then(|| {
-            "heights are read as above what flight.height says: add the height of the ground".to_owned()
-        }),
-        AirPressure => (is_geodetic && height != Some(ColumnMeaning::PressureHeight)).then(|| {
-            "heights are read as true ones: those by air pressure may be off by 100 m and more".to_owned()
-        }),
-        NorthEastDown => world(match layout.frame {
-            Frame::NorthEastDown | Frame::Geodetic => true,
-            Frame::NorthEastUp | Frame::EastNorthUp => false,
-        }),
-        EastNorthUp => world(layout.frame == Frame::EastNorthUp || (is_geodetic && !has_attitude)),
-        OtherWorld => world(is_geodetic && !has_attitude),
-        ForwardRightDown => world(!has_attitude || layout.frame != Frame::EastNorthUp),
-        ForwardLeftUp => world(!has_attitude || layout.frame == Frame::EastNorthUp),
-        OtherBody => has_attitude.then(|| format!("{axes}: camera.mount turns the camera in that body")),
+        AirPressure => (
+            is_geodetic && height != Some(ColumnMeaning::PressureHeight),
+            "heights are read as true ones: those by air pressure may be off by 100 m and more",
+        ),
+        NorthEastDown => (!matches!(frame, Frame::NorthEastDown | Frame::Geodetic), &*turned),
+        EastNorthUp => (frame != Frame::EastNorthUp && (!is_geodetic || has_attitude), &*turned),
+        OtherWorld => (!is_geodetic || has_attitude, &*turned),
+        ForwardRightDown => (has_attitude && frame == Frame::EastNorthUp, &*turned),
+        ForwardLeftUp => (has_attitude && frame != Frame::EastNorthUp, &*turned),
+        OtherBody => (has_attitude, &*mounted),
         ScalarFirst | ScalarLast => {
             let AttitudeColumns::Quaternion([x, _, _, w]) = layout.attitude else { return None };
-            ((w < x) != (convention == ScalarFirst)).then(|| "the names say otherwise, and count".to_owned())
+            ((w < x) != (convention == ScalarFirst), "the names say otherwise, and count")
         }
-        WorldToBody => (kind == AttitudeKind::Quaternion).then(|| {
-            "quaternions are read as turning the body to the world: invert them if it is so".to_owned()
-        }),
-        MagneticNorth => (kind == AttitudeKind::Euler && !has_magnetic_yaw(layout))
-            .then(|| "yaw is read as from true north: add the declination".to_owned()),
-        CounterClockwise => (kind == AttitudeKind::Euler)
-            .then(|| "yaw is read as from north, clockwise: convert it".to_owned()),
-        LeftHanded => (is_local || has_attitude).then(|| format!("{axes}: {fix}")),
-        VerticalY => is_local.then(|| format!("{axes}: {fix}")),
-        ZUp => (is_local && up == "down").then(|| format!("{axes}: {fix}")),
-        ZDown => (is_local && up == "up").then(|| format!("{axes}: {fix}")),
-        XNorth => (layout.frame == Frame::EastNorthUp).then(|| format!("{axes}: {fix}")),
-        XEast => matches!(layout.frame, Frame::NorthEastUp | Frame::NorthEastDown)
-            .then(|| format!("{axes}: {fix}")),
-        Jpl => (kind == AttitudeKind::Quaternion).then(|| {
+        WorldToBody => {
+            (is_quaternion, "quaternions are read as turning the body to the world: invert them if it is so")
+        }
+        MagneticNorth => {
+            (is_euler && !has_magnetic_yaw(layout), "yaw is read as from true north: add the declination")
+        }
+        CounterClockwise => (is_euler, "yaw is read as from north, clockwise: convert it"),
+        LeftHanded => (!is_geodetic || has_attitude, &*turned),
+        VerticalY => (!is_geodetic, &*turned),
+        ZUp => (frame == Frame::NorthEastDown, &*turned),
+        ZDown => (matches!(frame, Frame::NorthEastUp | Frame::EastNorthUp), &*turned),
+        XNorth => (frame == Frame::EastNorthUp, &*turned),
+        XEast => (matches!(frame, Frame::NorthEastUp | Frame::NorthEastDown), &*turned),
+        Jpl => (
+            is_quaternion,
             "quaternions are read as Hamilton's, which turn the body to the world: invert them if they turn the \
-                world to the body"
-                .to_owned()
-        }),
-        PitchDown => (kind == AttitudeKind::Euler)
-            .then(|| "pitch is read as positive with the nose up: change its sign if it is not".to_owned()),
-        HeightDown => (up == "up")
-            .then(|| "heights are read as positive up: change their sign if they are not".to_owned()),
-        WestOrSouth => is_geodetic.then(|| {
-            "latitudes are read as positive north and longitudes as positive east: change the sign".to_owned()
-        }),
-        EulerOrder => (kind == AttitudeKind::Euler).then(|| {
-            "angles are read as yaw, then pitch, then roll, about turned axes (ZYX): convert them if they are not"
-                .to_owned()
-        }),
-        OtherPoint => Some(
-            "positions are read as those of the body: camera.mount says where the camera is in it".to_owned(),
+                world to the body",
         ),
-        Imperial => layout.position[2]
-            .factor
-            .is_none()
-            .then(|| "heights are read as metres: name units in the header, as `alt_ft`".to_owned()),
+        PitchDown => (is_euler, "pitch is read as positive with the nose up: change its sign if it is not"),
+        HeightDown => (
+            frame != Frame::NorthEastDown,
+            "heights are read as positive up: change their sign if they are not",
+        ),
+        WestOrSouth => (
+            is_geodetic,
+            "latitudes are read as positive north and longitudes as positive east: change the sign",
+        ),
+        EulerOrder => (
+            is_euler,
+            "angles are read as yaw, then pitch, then roll, about turned axes (ZYX): convert them if they \
+                are not",
+        ),
+        OtherPoint => {
+            (true, "positions are read as those of the body: camera.mount says where the camera is in it")
+        }
+        Imperial => (
+            layout.position[2].factor.is_none(),
+            "heights are read as metres: name units in the header, as `alt_ft`",
+        ),
+    };
+    differs.then(|| reason.to_owned())
+}
+
+/// How heights are read where their column or flight.height says otherwise than prose.
+fn other_height(stated: HeightReference, height: Option<ColumnMeaning>, spec: &FlightSpec) -> Option<String> {
+    if let Some(ColumnMeaning::Height(Some(named))) = height {
+        // The names are compared with the key where the column is chosen.
+        return (named != stated).then(|| "the name of the column says otherwise, and counts".to_owned());
     }
+    (stated != spec.height).then(|| {
+        format!(
+            "flight.height says \"{}\": set flight.height = \"{}\" if the line is about the heights",
+            spec.height.name(),
+            stated.name()
+        )
+    })
 }
 
 /// Whether the name of the yaw says that it is from magnetic north, of which the header's reader warns.
@@ -513,14 +366,14 @@ fn other_datum(line: &HeaderLine<'_>, layout: &TableLayout) -> Option<Doubt> {
         .split_whitespace()
         .map(|word| word.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_uppercase())
         .collect();
-    let is_named = |datum: &&&str| {
-        words.iter().any(|word| word == **datum) || words.windows(2).any(|pair| pair.concat() == ***datum)
+    let is_named = |datum: &&str| {
+        words.iter().any(|word| word == datum) || words.windows(2).any(|pair| pair.concat() == *datum)
     };
-    let datum = DATUMS.iter().find(is_named)?;
+    let datum = DATUMS.split(' ').find(is_named)?;
     // `logger WGS72 firmware`: the name of a device.
-    let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
-    if has(&["FIRMWARE", "SOFTWARE", "HARDWARE", "SERIAL"])
-        && !has(&["DATUM", "COORDINATES", "POSITIONS", "CRS", "LATITUDE", "LONGITUDE", "LAT", "LON"])
+    let has = |list: &str| words.iter().any(|word| has_word(list, word));
+    if has("FIRMWARE SOFTWARE HARDWARE SERIAL")
+        && !has("DATUM COORDINATES POSITIONS CRS LATITUDE LONGITUDE LAT LON")
     {
         return None;
     }

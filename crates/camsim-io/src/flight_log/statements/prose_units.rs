@@ -3,10 +3,13 @@
 //! Prose may be about anything: `Image height in mm: 24`. So a unit counts only in a line that is about columns
 //! and nothing else: it has no word that is not known here, and states no number.
 
+use std::ops::Range;
+
 use super::{
     super::{
         columns::Frame,
         units::{Dimension, Qualifier, Unit, parse_qualifier},
+        word_list::has_word,
     },
     Target,
 };
@@ -21,256 +24,34 @@ pub(super) struct Found {
 }
 
 /// Words that say nothing about which numbers have a unit.
-const FILLERS: &[&str] = &[
-    "unit",
-    "units",
-    "in",
-    "of",
-    "are",
-    "is",
-    "as",
-    "to",
-    "a",
-    "an",
-    "all",
-    "and",
-    "the",
-    "this",
-    "these",
-    "with",
-    "by",
-    "decimal",
-    "value",
-    "values",
-    "number",
-    "numbers",
-    "column",
-    "columns",
-    "col",
-    "cols",
-    "field",
-    "fields",
-    "row",
-    "rows",
-    "file",
-    "table",
-    "log",
-    "data",
-    "measured",
-    "given",
-    "recorded",
-    "logged",
-    "stored",
-    "expressed",
-    "written",
-    "stated",
-    "use",
-    "uses",
-    "using",
-    "format",
-    "scale",
-    "pose",
-    "poses",
-    "trajectory",
-    "flight",
-    "uav",
-    "drone",
-    "gps",
-    "gnss",
-    "above",
-    "sea",
-    "level",
-    "msl",
-    "amsl",
-    "asl",
-    "agl",
-    "orthometric",
-    "geoid",
-    "egm96",
-    "egm2008",
-    "navd88",
-    "ellipsoid",
-    "ellipsoidal",
-    "wgs84",
-    "wgs",
-    "84",
-    "since",
-    "from",
-    "boot",
-    "startup",
-    "start",
-    "epoch",
-    "unix",
-    "1970",
-    "utc",
-    "quaternion",
-    "quaternions",
-    "quat",
-    "hamilton",
-    "scalar",
-    "first",
-    "last",
-    "xyzw",
-    "wxyz",
-    "qx",
-    "qy",
-    "qz",
-    "qw",
-    "w",
-    "frame",
-    "convention",
-    "ned",
-    "enu",
-    "frd",
-    "flu",
-    "axis",
-    "axes",
-    "up",
-    "true",
-    "magnetic",
-    "per",
-    "/",
-    "en",
-    "über",
-    "meer",
-    "meeresspiegel",
-    "nn",
-    "au",
-    "dessus",
-    "du",
-    "niveau",
-    "de",
-    "la",
-    "mer",
-];
+const FILLERS: &str = "unit units in of are is as to a an all and the this these with by decimal value \
+    values number numbers column columns col cols field fields row rows file table log data measured given \
+    recorded logged stored expressed written stated use uses using format scale pose poses trajectory \
+    flight uav drone gps gnss above sea level msl amsl asl agl orthometric geoid egm96 egm2008 navd88 \
+    ellipsoid ellipsoidal wgs84 wgs 84 since from boot startup start epoch unix 1970 utc quaternion \
+    quaternions quat hamilton scalar first last xyzw wxyz qx qy qz qw w frame convention ned enu frd flu \
+    axis axes up true magnetic per / en über meer meeresspiegel nn au dessus du niveau de la mer";
 /// Such words that make another quantity of one right behind them, as in `frame height` and `start time`.
-const MODIFIERS: &[&str] = &[
-    "column",
-    "row",
-    "field",
-    "table",
-    "file",
-    "frame",
-    "scale",
-    "pose",
-    "trajectory",
-    "level",
-    "geoid",
-    "boot",
-    "start",
-    "startup",
-    "epoch",
-    "first",
-    "last",
-    "axis",
-    "axes",
-    "scalar",
-    "number",
-    "value",
-];
+const MODIFIERS: &str = "column row field table file frame scale pose trajectory level geoid boot start \
+    startup epoch first last axis axes scalar number value";
 /// Pairs of words one of which alone has another meaning.
-const FILLER_PAIRS: &[[&str; 2]] = &[
-    ["ground", "truth"],
-    ["camera", "pose"],
-    ["camera", "poses"],
-    ["camera", "trajectory"],
-    ["mean", "sea"],
-    ["right", "handed"],
-    ["left", "handed"],
-];
+const FILLER_PAIRS: &str = "ground truth, camera pose, camera poses, camera trajectory, mean sea, right \
+    handed, left handed";
 /// Words by which a unit without a quantity is that of the whole table.
-const WHOLE_TABLE: &[&str] = &["unit", "units", "values", "pose", "poses"];
+const WHOLE_TABLE: &str = "unit units values pose poses";
 /// Words behind which a unit stands.
-const LINKS: &[&str] =
-    &["in", "en", "is", "are", "unit", "units", "as", "decimal", "and", "use", "uses", "using", "given"];
+const LINKS: &str = "in en is are unit units as decimal and use uses using given";
 /// Quantities that are not read, and words that make another quantity of the one beside them (`antenna
 /// height`, `time offset`); their units do not matter.
-const OTHERS: &[&str] = &[
-    "speed",
-    "speeds",
-    "velocity",
-    "velocities",
-    "vel",
-    "groundspeed",
-    "airspeed",
-    "accuracy",
-    "accuracies",
-    "precision",
-    "deviation",
-    "std",
-    "sigma",
-    "covariance",
-    "error",
-    "errors",
-    "noise",
-    "wind",
-    "range",
-    "acceleration",
-    "accelerations",
-    "acc",
-    "accel",
-    "gyro",
-    "gyroscope",
-    "imu",
-    "gravity",
-    "temperature",
-    "rate",
-    "rates",
-    "climb",
-    "sink",
-    "vario",
-    "battery",
-    "voltage",
-    "mass",
-    "weight",
-    "focal",
-    "pixel",
-    "pixels",
-    "lens",
-    "baseline",
-    "antenna",
-    "lever",
-    "offset",
-    "wingspan",
-    "gimbal",
-    "camera",
-    "declination",
-    "variation",
-    "magnetometer",
-    "undulation",
-    "separation",
-    "radius",
-    "runway",
-    "airport",
-    "step",
-    "interval",
-    "period",
-    "delay",
-    "latency",
-    "duration",
-    "exposure",
-    "resolution",
-    "window",
-    "tolerance",
-    "threshold",
-    "home",
-    "takeoff",
-    "ground",
-    "terrain",
-    "geoid",
-    "max",
-    "maximum",
-    "min",
-    "minimum",
-    "average",
-    "initial",
-    "target",
-    "cruise",
-    "zone",
-];
+const OTHERS: &str = "speed speeds velocity velocities vel groundspeed airspeed accuracy accuracies \
+    precision deviation std sigma covariance error errors noise wind range acceleration accelerations acc \
+    accel gyro gyroscope imu gravity temperature rate rates climb sink vario battery voltage mass weight \
+    focal pixel pixels lens baseline antenna lever offset wingspan gimbal camera declination variation \
+    magnetometer undulation separation radius runway airport step interval period delay latency duration \
+    exposure resolution window tolerance threshold home takeoff ground terrain geoid max maximum min \
+    minimum average initial target cruise zone";
 /// Units of such quantities.
-const OTHER_UNITS: &[&str] =
-    &["knots", "knot", "kt", "kts", "kn", "mph", "kmh", "kph", "hpa", "mbar", "celsius", "volts", "bpm"];
+const OTHER_UNITS: &str = "knots knot kt kts kn mph kmh kph hpa mbar celsius volts bpm";
 
 /// One word of a line, or a slash between two.
 struct Word<'a> {
@@ -323,74 +104,56 @@ enum Quantity {
     Other,
 }
 
+/// Words of the time, of a latitude, longitude, height, roll, pitch and yaw; also in German, French, Spanish and
+/// Italian.
+const TIMES: &str = "time times timestamp timestamps stamp stamps t clock";
+const LATITUDES: &str = "lat latitude latitudes";
+const LONGITUDES: &str = "lon lng long longitude longitudes";
+const HEIGHTS: &str = "alt alts altitude altitudes height heights elevation elevations ele elev hmsl hae \
+    down z tz höhe höhen hoehe hauteur hauteurs altitud altura altitudine quota";
+const ANGLES: [&str; 3] = ["roll bank", "pitch", "yaw heading headings hdg"];
+/// Words of all angles, of a whole position, and of the lengths in it.
+const ATTITUDES: &str =
+    "angle angles attitude attitudes orientation orientations euler rpy rotation rotations";
+const POSITIONS: &str = "position positions coordinate coordinates location locations";
+const LENGTHS: &str = "translation translations xyz length lengths";
+
 fn quantity(word: &str, frame: Frame) -> Option<Quantity> {
+    let is = |list: &str| has_word(list, word);
     let is_geodetic = frame == Frame::Geodetic;
-    let position = |axis: usize| Some(Quantity::Read(vec![Target::Position(axis)], Dimension::Length));
-    let horizontal =
-        |axis: usize| (!is_geodetic).then(|| Quantity::Read(vec![Target::Position(axis)], Dimension::Length));
-    let degrees =
-        |axis: usize| is_geodetic.then(|| Quantity::Read(vec![Target::Position(axis)], Dimension::Angle));
-    let angle = |axis: usize| Some(Quantity::Read(vec![Target::Angle(axis)], Dimension::Angle));
+    let positions = |axes: &[usize], dimension: Dimension| {
+        Some(Quantity::Read(axes.iter().map(|&axis| Target::Position(axis)).collect(), dimension))
+    };
+    let angles =
+        |axes: Range<usize>| Some(Quantity::Read(axes.map(Target::Angle).collect(), Dimension::Angle));
+    let horizontal = |axis: usize| if is_geodetic { None } else { positions(&[axis], Dimension::Length) };
+    let degrees = |axis: usize| if is_geodetic { positions(&[axis], Dimension::Angle) } else { None };
     let (north, east) = if frame == Frame::EastNorthUp { (1, 0) } else { (0, 1) };
     match word {
-        "time" | "times" | "timestamp" | "timestamps" | "stamp" | "stamps" | "t" | "clock" => {
-            Some(Quantity::Read(vec![Target::Time], Dimension::Time))
-        }
-        "lat" | "latitude" | "latitudes" => degrees(0),
-        "lon" | "lng" | "long" | "longitude" | "longitudes" => degrees(1),
-        "alt" | "alts" | "altitude" | "altitudes" | "height" | "heights" | "elevation" | "elevations"
-        | "ele" | "elev" | "hmsl" | "hae" | "down" | "z" | "tz"
-        // German, French, Spanish, Italian.
-        | "höhe" | "höhen" | "hoehe" | "hauteur" | "hauteurs" | "altitud" | "altura" | "altitudine"
-        | "quota" => position(2),
+        _ if is(TIMES) => Some(Quantity::Read(vec![Target::Time], Dimension::Time)),
+        _ if is(LATITUDES) => degrees(0),
+        _ if is(LONGITUDES) => degrees(1),
+        _ if is(HEIGHTS) => positions(&[2], Dimension::Length),
         "north" | "northing" => horizontal(north),
         "east" | "easting" => horizontal(east),
         "x" | "tx" => horizontal(0),
         "y" | "ty" => horizontal(1),
-        "position" | "positions" | "coordinate" | "coordinates" | "location" | "locations" if is_geodetic => {
-            Some(Quantity::Read(vec![Target::Position(0), Target::Position(1)], Dimension::Angle))
-        }
-        "position" | "positions" | "coordinate" | "coordinates" | "location" | "locations"
-        | "translation" | "translations" | "xyz" | "length" | "lengths" => Some(match is_geodetic {
-            true => Quantity::Read(vec![Target::Position(2)], Dimension::Length),
-            false => Quantity::Read((0..3).map(Target::Position).collect(), Dimension::Length),
-        }),
-        "roll" | "bank" => angle(0),
-        "pitch" => angle(1),
-        "yaw" | "heading" | "headings" | "hdg" => angle(2),
-        "angle" | "angles" | "attitude" | "attitudes" | "orientation" | "orientations" | "euler" | "rpy"
-        | "rotation" | "rotations" => {
-            Some(Quantity::Read((0..3).map(Target::Angle).collect(), Dimension::Angle))
-        }
-        _ => OTHERS.contains(&word).then_some(Quantity::Other),
+        _ if is_geodetic && is(POSITIONS) => positions(&[0, 1], Dimension::Angle),
+        _ if is_geodetic && is(LENGTHS) => positions(&[2], Dimension::Length),
+        _ if is(POSITIONS) || is(LENGTHS) => positions(&[0, 1, 2], Dimension::Length),
+        _ if is(ATTITUDES) => angles(0..3),
+        _ => match ANGLES.iter().position(|list| is(list)) {
+            Some(axis) => angles(axis..axis + 1),
+            None => has_word(OTHERS, word).then_some(Quantity::Other),
+        },
     }
 }
 
 /// Letters that are units only where they plainly stand for one.
 fn is_short(word: &str) -> bool {
-    word.chars().count() <= 1
-        || matches!(
-            word,
-            "us" | "mi"
-                | "hr"
-                | "hrs"
-                | "min"
-                | "mins"
-                | "minute"
-                | "minutes"
-                | "hour"
-                | "hours"
-                | "day"
-                | "days"
-                | "dd"
-                | "second"
-                | "foot"
-                | "inch"
-                | "mm"
-                | "cm"
-                | "dm"
-                | "yd"
-        )
+    const SHORT: &str =
+        "us mi hr hrs min mins minute minutes hour hours day days dd second foot inch mm cm dm yd";
+    word.chars().count() <= 1 || has_word(SHORT, word)
 }
 
 fn unit(word: &str) -> Option<&'static Unit> {
@@ -410,6 +173,10 @@ fn unit_at(words: &[Word<'_>], index: usize) -> Option<(&'static Unit, usize)> {
     })
 }
 
+fn is_filler_pair([first, second]: [&str; 2]) -> bool {
+    FILLER_PAIRS.split(", ").any(|pair| pair.split_once(' ') == Some((first, second)))
+}
+
 fn is_number(word: &str) -> bool {
     word.starts_with(|c: char| c.is_ascii_digit())
 }
@@ -421,15 +188,15 @@ fn has_other_words(words: &[Word<'_>], frame: Frame) -> bool {
     while let Some(word) = words.get(next) {
         let following = words.get(next + 1);
         let pair = [word.text, following.map_or("", |word| word.text)];
-        let is_modifier = MODIFIERS.contains(&word.text)
+        let is_modifier = has_word(MODIFIERS, word.text)
             && following.is_some_and(|word| word.is_adjacent && quantity(word.text, frame).is_some());
-        let count = if FILLER_PAIRS.contains(&pair) {
+        let count = if is_filler_pair(pair) {
             2
         } else if let Some((_, count)) = unit_at(words, next) {
             count
         } else if quantity(word.text, frame).is_some()
-            || (FILLERS.contains(&word.text) && !is_modifier)
-            || OTHER_UNITS.contains(&word.text)
+            || (has_word(FILLERS, word.text) && !is_modifier)
+            || has_word(OTHER_UNITS, word.text)
             // `4: altitude`, `column 4`, `5-7: angles`.
             || (is_number(word.text) && (!has_words || words[next - 1].text.starts_with("col")))
         {
@@ -464,7 +231,7 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
     }
     let text = |index: usize| words.get(index).map_or("", |word| word.text);
     let has_other_words = has_other_words(&words, frame);
-    let states_units = words.iter().any(|word| WHOLE_TABLE.contains(&word.text))
+    let states_units = words.iter().any(|word| has_word(WHOLE_TABLE, word.text))
         // `[mm]`
         || (words.len() == 1 && words[0].is_marked);
     let mut found = Found::default();
@@ -479,18 +246,18 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
         if word.begins_sentence {
             pending.clear();
         }
-        if FILLER_PAIRS.contains(&[word.text, text(next)]) {
+        if is_filler_pair([word.text, text(next)]) {
             continue;
         }
         if let Some(quantity) = quantity(word.text, frame) {
-            let is_qualified = word.is_adjacent && OTHERS.contains(&before);
+            let is_qualified = word.is_adjacent && has_word(OTHERS, before);
             if quantity == Quantity::Other && word.is_adjacent && self::quantity(before, frame).is_some() {
                 pending.pop();
             }
             pending.push(if is_qualified { Quantity::Other } else { quantity });
             continue;
         }
-        if OTHER_UNITS.contains(&word.text) {
+        if has_word(OTHER_UNITS, word.text) {
             pending.retain(|quantity| *quantity != Quantity::Other);
         }
         let Some((unit, count)) = unit_at(&words, index) else { continue };
@@ -525,7 +292,7 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
         }
         let is_linked = word.is_marked
             || follows_unit
-            || LINKS.contains(&before)
+            || has_word(LINKS, before)
             || quantity(before, frame).is_some()
             || self::unit(before).is_some();
         let mut targets: Vec<Target> = Vec::new();
@@ -546,7 +313,7 @@ pub(super) fn find(line: &str, frame: Frame) -> Found {
             continue;
         }
         // `altitude in feet of terrain`
-        let is_of_other = had_others || (text(next) == "of" && OTHERS.contains(&text(next + 1)));
+        let is_of_other = had_others || (text(next) == "of" && has_word(OTHERS, text(next + 1)));
         let is_plain = is_linked && !has_other_words && !is_of_other;
         if is_plain && (!targets.is_empty() || states_units) {
             found.plain.push((targets, unit));

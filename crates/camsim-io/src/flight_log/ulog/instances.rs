@@ -38,18 +38,10 @@ pub(super) fn candidates<'a>(file: &UlogFile<'a>, name: &str) -> Vec<Candidate<'
         return vec![primary];
     }
     let list = instances.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
-    let note = |topic: &Topic<'_>| Note {
-        is_warning: true,
-        text: format!(
-            "`{stem}` has the instances {list}, and the log does not say which the vehicle used: {} is flown; set \
-                flight.topic = \"{stem}#1\" for another",
-            topic.instance
-        ),
-    };
     topics
         .into_iter()
         .map(|topic| {
-            let note = Some(note(&topic));
+            let note = Some(streams::instance_note(stem, &list, topic.instance.into()));
             Candidate { topic, note }
         })
         .collect()

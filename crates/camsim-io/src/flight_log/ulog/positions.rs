@@ -88,7 +88,11 @@ impl PositionReader {
             && matches!(place, Place::Geodetic { ellipsoid: Some(field), .. } if has_ellipsoid(field));
         let is_geodetic = reference.is_some() || matches!(place, Place::Geodetic { .. });
         if is_geodetic && !uses_ellipsoid {
-            notes.extend(streams::height_note(&format!("heights of `{}`", topic.name), true, spec));
+            notes.extend(streams::height_note(
+                &format!("heights of `{}`", topic.name),
+                HeightReference::Msl,
+                spec,
+            ));
         }
         let quaternion = match place {
             Place::Local(_) if topic.field("position[0]").is_some() => {
@@ -155,34 +159,25 @@ impl PositionReader {
         }
         let name = full_name(topic);
         if left_out > 0 {
-            notes.push(Note {
-                is_warning: true,
-                text: format!(
-                    "{left_out} of {} positions of `{name}` are marked as invalid or without a 3D fix, and \
+            notes.push(Note::warning(format!(
+                "{left_out} of {} positions of `{name}` are marked as invalid or without a 3D fix, and \
                         are left out",
-                    topic.messages.len()
-                ),
-            });
+                topic.messages.len()
+            )));
         }
         if reckoned > 0 {
-            notes.push(Note {
-                is_warning: true,
-                text: format!(
-                    "{reckoned} of {} positions of `{name}` are dead reckoning (without GNSS or another \
+            notes.push(Note::warning(format!(
+                "{reckoned} of {} positions of `{name}` are dead reckoning (without GNSS or another \
                         position), and drift",
-                    topic.messages.len()
-                ),
-            });
+                topic.messages.len()
+            )));
         }
         if let Some(first) = resets.first() {
-            notes.push(Note {
-                is_warning: true,
-                text: format!(
-                    "the estimator moved the positions of `{name}` at once {} times, first at message \
+            notes.push(Note::warning(format!(
+                "the estimator moved the positions of `{name}` at once {} times, first at message \
                         {first}: the flight jumps there",
-                    resets.len()
-                ),
-            });
+                resets.len()
+            )));
         }
         Stream { name, rows }
     }
