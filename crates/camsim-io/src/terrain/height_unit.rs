@@ -14,9 +14,11 @@ use super::{
 };
 use crate::wording::range;
 
+/// A unit in metres, with what states it.
+type Stated = (String, f64);
+
 /// Metres per unit of the heights. Where the file states several units or may have one of two, the key
 /// decides.
-// Long because: one list of stated units is filled from six sources and then compared.
 pub(super) fn unit_m(
     path: &Path,
     spec: &TerrainSpec,
@@ -26,108 +28,116 @@ pub(super) fn unit_m(
     crs: &Crs,
     notes: &mut Vec<String>,
 ) -> Result<f64, TerrainFileError> {
-    let meaning = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
     let key_unit_m = spec.height_unit.map(HeightUnit::metres);
-    let mut stated: Vec<(String, f64)> = Vec::new();
-    if let Some(name) = geo.bands.first().and_then(|band| band.unit.as_ref()) {
-        match metres_per_unit_name(name) {
-            Some(unit) => stated.push((format!("unit `{name}`"), unit)),
-            None if key_unit_m.is_none() => {
-                return Err(meaning(format!(
-                    "states `{name}` as the unit of its heights, which is unknown: set \
-                     scene.terrain.height_unit = {HEIGHT_UNITS}"
-                )));
-            }
-            None => {}
+    let mut stated = by_tags(path, key_unit_m, geo, verticals, by_name)?;
+    let has_tags = !stated.is_empty();
+    stated.extend(
+        descriptions::units(geo).filter_map(|(name, value)| {
+            Some((format!("item {name} `{value}`"), metres_per_unit_name(value)?))
+        }),
+    );
+    // Citations are names for people: they count where nothing else states a unit.
+    let (citation, advice) = match (&stated[..], key_unit_m) {
+        ([], None) => (citations::height_unit(&geo.keys), "set scene.terrain.height_unit = \"m\""),
+        ([first, ..], None) if !has_tags => {
+            (Some(first.clone()), "remove it and set scene.terrain.height_unit")
         }
+        _ => (None, ""),
+    };
+    if let Some((text, unit)) = citation.as_ref().filter(|(_, unit)| *unit != 1.0) {
+        notes.push(format!(
+            "its heights are read in units of {unit} m, from its {text}: if that is not the unit of heights, \
+                {advice}"
+        ));
+    }
+    if stated.is_empty() {
+        stated.extend(citation);
+    }
+    agreed(key_unit_m, &stated, crs)
+        .map_err(|problem| TerrainFileError::Meaning { path: path.into(), problem })
+}
+
+/// The units that the tags of the file, its sidecar files and its vertical reference systems state.
+///
+/// # Errors
+/// A unit is not known, and there is no key; or a system has depths.
+fn by_tags(
+    path: &Path,
+    key_unit_m: Option<f64>,
+    geo: &GeoTags,
+    verticals: &[&StatedVerticalCrs],
+    by_name: &[(String, String)],
+) -> Result<Vec<Stated>, TerrainFileError> {
+    let meaning = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
+    // The key stands for a unit that is not known.
+    let known = |unit: Option<f64>, error: &dyn Fn() -> TerrainFileError| match unit {
+        None if key_unit_m.is_none() => Err(error()),
+        unit => Ok(unit),
+    };
+    let mut stated: Vec<Stated> = Vec::new();
+    if let Some(name) = geo.bands.first().and_then(|band| band.unit.as_ref()) {
+        let unknown = || {
+            meaning(format!(
+                "states `{name}` as the unit of its heights, which is unknown: set scene.terrain.height_unit \
+                    = {HEIGHT_UNITS}"
+            ))
+        };
+        let unit = known(metres_per_unit_name(name), &unknown)?;
+        stated.extend(unit.map(|unit| (format!("unit `{name}`"), unit)));
     }
     for (name, from) in by_name {
-        match metres_per_unit_name(name) {
-            // ARC/INFO has one name for both feet.
-            Some(unit) if key_unit_m.is_some_and(|key| (key - unit).abs() < 1e-6) => {}
-            Some(unit) => stated.push((format!("{from} {name}"), unit)),
-            None if key_unit_m.is_none() => {
-                return Err(meaning(format!(
-                    "{from} is `{name}`, which is an unknown unit: set scene.terrain.height_unit = {HEIGHT_UNITS}"
-                )));
-            }
-            None => {}
-        }
+        let unknown = || {
+            meaning(format!(
+                "{from} is `{name}`, which is an unknown unit: set scene.terrain.height_unit = {HEIGHT_UNITS}"
+            ))
+        };
+        let unit = known(metres_per_unit_name(name), &unknown)?;
+        // ARC/INFO has one name for both feet.
+        let other = unit.filter(|unit| !key_unit_m.is_some_and(|key| (key - unit).abs() < 1e-6));
+        stated.extend(other.map(|unit| (format!("{from} {name}"), unit)));
     }
     for vertical in verticals {
-        let Some(unit) = &vertical.metres_per_unit else { continue };
-        let label = vertical
-            .code
-            .map_or_else(|| vertical.name.clone(), |code| format!("EPSG:{code} ({})", vertical.name));
-        if *unit < 0.0 {
+        let Some(unit) = vertical.metres_per_unit else { continue };
+        if unit < 0.0 {
             return Err(meaning(format!(
                 "states depths ({}), positive downwards: negate them with `gdal_calc.py -A IN --calc=-A \
                  --outfile OUT`",
                 vertical.label()
             )));
         }
-        stated.push((label, *unit));
+        let name = &vertical.name;
+        stated
+            .push((vertical.code.map_or_else(|| name.clone(), |code| format!("EPSG:{code} ({name})")), unit));
     }
     if let Some(code) = geo.keys.vertical_unit {
-        match metres_per_unit_code(code) {
-            Some(unit) => stated.push((format!("VerticalUnits {code}"), unit)),
-            None if key_unit_m.is_none() => {
-                return Err(TerrainFileError::Unit { path: path.into(), kind: "vertical", code });
-            }
-            None => {}
-        }
+        let unknown = || TerrainFileError::Unit { path: path.into(), kind: "vertical", code };
+        let unit = known(metres_per_unit_code(code), &unknown)?;
+        stated.extend(unit.map(|unit| (format!("VerticalUnits {code}"), unit)));
     }
-    let tag_count = stated.len();
-    stated.extend(
-        descriptions::units(geo).filter_map(|(name, value)| {
-            Some((format!("item {name} `{value}`"), metres_per_unit_name(value)?))
-        }),
-    );
-    if let (0, None, Some((text, unit))) =
-        (tag_count, key_unit_m, stated.first().filter(|(_, unit)| *unit != 1.0))
-    {
-        notes.push(format!(
-            "its heights are read in units of {unit} m, from its {text}: if that is not the unit of heights, \
-             remove it and set scene.terrain.height_unit"
-        ));
-    }
-    // Citations are names for people: they count where nothing else states a unit.
-    if stated.is_empty()
-        && key_unit_m.is_none()
-        && let Some((text, unit)) = citations::height_unit(&geo.keys)
-    {
-        if unit != 1.0 {
-            notes.push(format!(
-                "its heights are read in units of {unit} m, from its {text}: if that is not the unit of heights, \
-                 set scene.terrain.height_unit = \"m\""
-            ));
-        }
-        stated.push((text, unit));
-    }
+    Ok(stated)
+}
+
+/// The unit of the key, which must be one of those that are stated; without a key these must agree.
+fn agreed(key_unit_m: Option<f64>, stated: &[Stated], crs: &Crs) -> Result<f64, String> {
     let is_same = |a: f64, b: f64| (a - b).abs() < SAME_UNIT_M;
-    let agree = stated.windows(2).all(|pair| is_same(pair[0].1, pair[1].1));
     let listed =
         || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
     match (key_unit_m, stated.first()) {
-        (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| is_same(*stated, unit)) => {
-            Err(meaning(format!(
-                "states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file",
-                listed()
-            )))
-        }
+        (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| is_same(*stated, unit)) => Err(format!(
+            "states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file",
+            listed()
+        )),
         (Some(unit), _) => Ok(unit),
-        (None, Some(_)) if !agree => {
-            Err(meaning(format!("states {}: set scene.terrain.height_unit = {HEIGHT_UNITS}", listed())))
+        (None, Some(_)) if stated.windows(2).any(|pair| !is_same(pair[0].1, pair[1].1)) => {
+            Err(format!("states {}: set scene.terrain.height_unit = {HEIGHT_UNITS}", listed()))
         }
         (None, Some((_, unit))) => Ok(*unit),
         // Files with coordinates in feet may have heights in feet or metres.
-        (None, None) if crs.metres_per_unit().is_some_and(|unit| !is_same(unit, 1.0)) => {
-            Err(meaning(format!(
-                "EPSG:{} ({}) has coordinates in feet, and the unit of the heights is not stated: set \
-                 scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
-                crs.epsg, crs.name
-            )))
-        }
+        (None, None) if crs.metres_per_unit().is_some_and(|unit| !is_same(unit, 1.0)) => Err(format!(
+            "EPSG:{} ({}) has coordinates in feet, and the unit of the heights is not stated: set \
+             scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
+            crs.epsg, crs.name
+        )),
         (None, None) => Ok(1.0),
     }
 }
