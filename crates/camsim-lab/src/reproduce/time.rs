@@ -82,7 +82,6 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
 }
 
 /// Rotation: figs. 13 and 14.
-// Long because: a list of tables, plots and pictures.
 fn rotation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), ReproduceError> {
     let scene = test_bench::target(setup, TARGET_M)?;
     let bench = test_bench::sequence(test_bench::pinhole(setup.width_px), Motion::turning(), &scene)?;
@@ -146,27 +145,7 @@ fn rotation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), Repr
     let cell = |text: &str| text.to_owned();
     table.row([cell("camsim, its own frame"), cell("-"), cell("-"), short(own_px), own_missed.to_string()]);
     report.tables.push(("fig14", table));
-    let curve = |name: &str, errors: &[StepError], pick: fn(&StepError) -> f64| {
-        Series::line(name, errors.iter().map(|error| (error.step_deg, pick(error))).collect())
-    };
-    report.plots.push((
-        "fig14",
-        Plot {
-            title: "Fig. 14: error against step size, 36 deg of rotation".into(),
-            x_label: "step, deg".into(),
-            y_label: "error, px RMS".into(),
-            log: [true, true],
-            series: vec![
-                curve("linear, circles", &on_circles, |e| e.linear_px),
-                curve("RK2, circles", &on_circles, |e| e.rk2_px),
-                curve("RK2, whole frame", &on_frame, |e| e.rk2_px),
-                curve("RK2, pitch instead of roll", &pitched, |e| e.rk2_px),
-                Series::line("RK2, circles detected in frames", by_pictures),
-                Series::line("camsim, circles detected in its frame", vec![(0.5, own_px), (36.0, own_px)]),
-                Series::dots("text of the paper: 0.02 px at 2.5 deg", vec![(2.5, 0.02)]),
-            ],
-        },
-    ));
+    report.plots.push(("fig14", fig14_plot([&on_circles, &on_frame, &pitched], by_pictures, own_px)));
     report.pictures.push(Picture {
         name: "fig13",
         caption: "Fig. 13: (a) at the start, (b) after 1 s of rotation (36 deg), (c) 1 s later with 1 s of \
@@ -185,6 +164,37 @@ fn rotation(setup: &Setup<'_>, report: &mut ExperimentReport) -> Result<(), Repr
         shrink: 2,
     });
     Ok(())
+}
+
+/// The errors of fig. 14 at the circles, over the frame, and over it in pitch; by the paper's pictures and by
+/// camsim's own.
+fn fig14_plot(
+    [on_circles, on_frame, pitched]: [&[StepError]; 3],
+    by_pictures: Vec<(f64, f64)>,
+    own_px: f64,
+) -> Plot {
+    let curve = |name: &str, errors: &[StepError], pick: fn(&StepError) -> f64| {
+        Series::line(name, errors.iter().map(|error| (error.step_deg, pick(error))).collect())
+    };
+    Plot {
+        title: "Fig. 14: error against step size, 36 deg of rotation".into(),
+        x_label: "step, deg".into(),
+        y_label: "error, px RMS".into(),
+        log: [true, true],
+        series: vec![
+            curve("linear, circles", on_circles, |e| e.linear_px),
+            curve("RK2, circles", on_circles, |e| e.rk2_px),
+            curve("RK2, whole frame", on_frame, |e| e.rk2_px),
+            curve("RK2, pitch instead of roll", pitched, |e| e.rk2_px),
+            Series::line("RK2, circles detected in frames", by_pictures),
+            Series::line("camsim, circles detected in its frame", vec![(0.5, own_px), (36.0, own_px)]),
+            Series {
+                name: "text of the paper: 0.02 px at 2.5 deg".into(),
+                points: vec![(2.5, 0.02)],
+                joined: false,
+            },
+        ],
+    }
 }
 
 /// Translation: fig. 15.
