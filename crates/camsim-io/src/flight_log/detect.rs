@@ -56,17 +56,17 @@ pub(super) fn detect_format(table: &Table<'_>, spec: &FlightSpec) -> Result<LogF
 /// Whether columns 4 to 7 (from 0) are quaternions: of those that are not 0, nine in ten have norm 1, or they
 /// change and have one common norm.
 fn has_quaternions(sample: &[Vec<f64>]) -> bool {
-    let norms: Vec<f64> = sample
+    let quaternions: Vec<&[f64]> = sample.iter().filter_map(|row| row.get(4..8)).collect();
+    let norms: Vec<f64> = quaternions
         .iter()
-        .filter(|row| row.len() >= 8)
-        .map(|row| row[4..8].iter().map(|q| q * q).sum::<f64>().sqrt())
+        .map(|q| q.iter().map(|q| q * q).sum::<f64>().sqrt())
         .filter(|norm| *norm > 0.0)
         .collect();
     let most_near = |norm: f64, tolerance: f64| {
         norms.iter().filter(|other| (*other / norm - 1.0).abs() < tolerance).count() * 10 >= norms.len() * 9
             && !norms.is_empty()
     };
-    let changes = || sample.iter().filter(|row| row.len() >= 8).any(|row| row[4..8] != sample[0][4..8]);
+    let changes = || quaternions.windows(2).any(|pair| pair[0] != pair[1]);
     most_near(1.0, 0.01) || norms.first().is_some_and(|&first| most_near(first, 1e-4) && changes())
 }
 

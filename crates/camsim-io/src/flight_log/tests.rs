@@ -97,6 +97,12 @@ fn auto_format_refuses_tables_that_fit_two_layouts() {
         raw("0,1,2,3,4\n", LogFormat::Auto),
         Err(FlightLogError { problem: LogProblem::UnknownLayout(5), .. })
     ));
+    // A first row that is shorter than the others.
+    let short = format!("1\n{}", "0.1 1 2 3 0 0 0 2\n".repeat(3));
+    assert!(matches!(
+        raw(&short, LogFormat::Auto),
+        Err(FlightLogError { problem: LogProblem::UnknownLayout(8), .. })
+    ));
     assert_eq!(raw(one_row, LogFormat::CsvLla).unwrap().len(), 1);
 }
 
