@@ -188,11 +188,7 @@ fn fig14_plot(
             curve("RK2, pitch instead of roll", pitched, |e| e.rk2_px),
             Series::line("RK2, circles detected in frames", by_pictures),
             Series::line("camsim, circles detected in its frame", vec![(0.5, own_px), (36.0, own_px)]),
-            Series {
-                name: "text of the paper: 0.02 px at 2.5 deg".into(),
-                points: vec![(2.5, 0.02)],
-                joined: false,
-            },
+            Series::dots("text of the paper: 0.02 px at 2.5 deg", vec![(2.5, 0.02)]),
         ],
     }
 }
