@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use camsim::{
     core::scenario::CameraSpec,
-    io::{camera_file::import_camera_named, scenario_file::read_checked_camera},
+    io::{formats::reading::import_camera_named, scenario_file::read_checked_camera},
 };
 use pyo3::prelude::*;
 

@@ -8,7 +8,7 @@ use camsim_core::{
 };
 use serde_json::Value;
 
-use crate::camera_file::document::{Document, KeyProblem, find, number, optional_number, word};
+use crate::text::document::{Document, KeyProblem, find, number, optional_number, word};
 
 /// Why a board cannot be made.
 #[derive(Debug, thiserror::Error)]

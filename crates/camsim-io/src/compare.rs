@@ -10,9 +10,10 @@ use std::{
 };
 
 use camsim_core::metrics::{self, Comparison, ImageView, MetricError};
-use exr::prelude::read_first_flat_layer_from_file;
 use serde::Serialize;
 use thiserror::Error;
+
+use crate::frame_file::exr_planes;
 
 /// Why two paths cannot be compared.
 #[derive(Debug, Error)]
@@ -257,25 +258,19 @@ fn read(path: &Path) -> Result<ComparedPicture, CompareError> {
     }
 }
 
-/// Reads the first layer of an EXR, with channels in the order R, G, B, A, and others by name.
+/// Reads an EXR, with channels in the order R, G, B, A, and others by name.
 fn read_exr(path: &Path) -> Result<ComparedPicture, String> {
-    let layer = read_first_flat_layer_from_file(path).map_err(|error| error.to_string())?.layer_data;
-    let mut planes: Vec<(String, Vec<f32>)> = layer
-        .channel_data
-        .list
-        .iter()
-        .map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect()))
-        .collect();
-    planes.sort_by_key(|(name, _)| {
-        (["R", "G", "B", "A"].iter().position(|n| n == name).unwrap_or(4), name.clone())
+    let mut planes = exr_planes::read(path).map_err(|error| error.to_string())?.planes;
+    planes.sort_by_key(|plane| {
+        (["R", "G", "B", "A"].iter().position(|name| *name == plane.name).unwrap_or(4), plane.name.clone())
     });
-    let pixels = layer.size.0 * layer.size.1;
-    if planes.iter().any(|(_, plane)| plane.len() != pixels) {
+    let size_px @ [width, height] = planes.first().ok_or("it has no channels")?.size_px;
+    let pixels = width as usize * height as usize;
+    if planes.iter().any(|plane| plane.values.len() != pixels) {
         return Err("it has subsampled channels".into());
     }
-    let samples = (0..pixels).flat_map(|pixel| planes.iter().map(move |(_, plane)| plane[pixel])).collect();
-    let channels = planes.iter().map(|(name, _)| name.clone()).collect();
-    Ok(ComparedPicture { size_px: [layer.size.0 as u32, layer.size.1 as u32], channels, samples })
+    let samples = (0..pixels).flat_map(|pixel| planes.iter().map(move |plane| plane.values[pixel])).collect();
+    Ok(ComparedPicture { size_px, channels: planes.into_iter().map(|plane| plane.name).collect(), samples })
 }
 
 fn read_png(path: &Path) -> Result<ComparedPicture, String> {

@@ -97,7 +97,7 @@ use layout::TableLayout;
 use text_table::Table;
 
 use crate::{
-    calibration::axes::{enu, enu_from_flu},
+    formats::axes::{enu, enu_from_flu},
     similar_file::suggestion,
 };
 

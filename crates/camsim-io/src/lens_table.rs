@@ -22,8 +22,8 @@ use camsim_core::{
 use glam::DVec2;
 
 use crate::{
-    csv_table::{finite, open_table},
     frame_file::{FrameFileError, exr_planes::read_exr},
+    table::{finite, open_table},
 };
 
 /// Relative deviation of a node from a regular grid, in steps.

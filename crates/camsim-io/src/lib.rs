@@ -16,8 +16,7 @@
 //! | module | reads or writes |
 //! |---|---|
 //! | [`scenario_file`] | scenarios and camera files (TOML), `--set` |
-//! | [`camera_file`] | calibrations of other programs |
-//! | [`calibration`] | calibrations for other programs |
+//! | [`formats`] | calibrations of and for other programs; output folders in their layouts |
 //! | [`flight_log`] | flight logs: CSV, TUM, EuRoC, GPX |
 //! | [`terrain`] | heights and ortho-images |
 //! | [`gltf_file`] | models |
@@ -25,7 +24,6 @@
 //! | [`pictures`] | textures and grey images |
 //! | [`load`] | everything that a scenario names |
 //! | [`frame_file`] | RGB-D frames for `camsim apply` |
-//! | [`dataset`] | output folders in the layouts of other programs |
 //! | [`write`](mod@write) | frames and tables |
 //! | [`columns`] | columns of the tables |
 //! | [`manifest`] | `run.json`; resuming of runs |
@@ -40,12 +38,10 @@
 
 pub mod board_file;
 pub mod builtin;
-pub mod calibration;
-pub mod camera_file;
 pub mod columns;
 pub mod compare;
-pub mod dataset;
 pub mod flight_log;
+pub mod formats;
 pub mod frame_file;
 pub mod gltf_file;
 pub mod inputs;
@@ -61,10 +57,10 @@ pub mod shell;
 pub mod terrain;
 pub mod write;
 
-mod csv_table;
 #[cfg(test)]
 mod inputs_page;
 mod median;
 mod similar_file;
+mod table;
+mod text;
 mod unlikely_camera;
-mod wording;

@@ -148,7 +148,7 @@ fn has_content(path: &Path, bytes: &[u8]) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
-    use crate::{camera_file::read_camera_toml, scenario_file::read_camera};
+    use crate::{formats::reading::read_camera_toml, scenario_file::read_camera};
     use camsim_core::scenario::ZoomSpec;
 
     #[test]

@@ -39,7 +39,7 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use crate::{pictures::PictureError, wording::range};
+use crate::{pictures::PictureError, text::wording::range};
 pub use documentation::documentation;
 pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
 pub(crate) use units::metres_per_unit_name;

@@ -11,7 +11,7 @@ use camsim_core::{
     scenario::{CameraSpec, LensModel},
 };
 
-use crate::wording::rounded;
+use crate::text::wording::rounded;
 
 mod lens;
 mod principal_point;

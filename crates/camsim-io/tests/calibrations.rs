@@ -4,8 +4,8 @@
 
 use camsim_core::scenario::{CameraSpec, ChromaticSpec, ImageCircleSpec, LensModel, LensSpec, Readout};
 use camsim_io::{
-    calibration::{CalibrationFormat, export},
-    camera_file::{CameraFormat, ImportOptions, ImportedRig, import_rig},
+    formats::reading::{CameraFormat, ImportOptions, ImportedRig, import_rig},
+    formats::writing::{CalibrationFormat, export},
 };
 
 /// The name under which each format is read back.

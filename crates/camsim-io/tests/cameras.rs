@@ -16,7 +16,7 @@ mod syntax;
 mod timing;
 
 use camsim_core::scenario::{CameraSpec, LensModel};
-use camsim_io::camera_file::{CameraFormat, ImportedCamera, import_camera_named};
+use camsim_io::formats::reading::{CameraFormat, ImportedCamera, import_camera_named};
 
 /// Imports a text as a file of a name.
 fn import(

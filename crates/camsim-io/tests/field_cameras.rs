@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use camsim_core::scenario::{CameraSpec, LensModel, Readout};
-use camsim_io::camera_file::{
+use camsim_io::formats::reading::{
     CameraFormat, ImportOptions, ImportedCamera, import_camera_as, import_camera_with, import_rig,
     read_camera_toml,
 };

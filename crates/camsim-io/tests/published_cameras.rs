@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use camsim_core::scenario::{CameraSpec, LensModel};
-use camsim_io::camera_file::{CameraFileError, camera_names, import_camera_named};
+use camsim_io::formats::reading::{CameraFileError, camera_names, import_camera_named};
 
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/inputs/CAMERAS-MEASURED.md");
 

@@ -11,7 +11,7 @@ use std::{
 
 use camsim_engine::{Engine, GpuError, RenderError};
 use camsim_io::{
-    camera_file::CameraFileError, flight_log::FlightLogError, load::LoadError, pictures::PictureError,
+    flight_log::FlightLogError, formats::reading::CameraFileError, load::LoadError, pictures::PictureError,
     scenario_file::ScenarioError, write::WriteError,
 };
 

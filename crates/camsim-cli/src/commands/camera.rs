@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
-    calibration::{CalibrationFormat, export},
-    camera_file::{
+    formats::reading::{
         BodyAxes, CameraFormat, ImportOptions, LensfunQuery, import_camera_with, import_lensfun, import_rig,
     },
+    formats::writing::{CalibrationFormat, export},
     kernel_file::load_kernel,
     lens_table::load_lens_table,
     scenario_file::read_cameras,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use camsim_core::scenario::{DatasetFormat, Scenario};
 use camsim_io::{
-    dataset::{DatasetError, ExportOptions, RunFolder, Watch, export, judge_lens, require},
+    formats::exporting::{DatasetError, ExportOptions, RunFolder, Watch, export, judge_lens, require},
     shell::quoted,
 };
 use clap::builder::{PossibleValuesParser, TypedValueParser};

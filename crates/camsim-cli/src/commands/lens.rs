@@ -13,7 +13,7 @@ use camsim_core::camera::{BulkInverse, CameraModel, LensCheck, fringes_px};
 use camsim_core::mtf::CameraMtf;
 use camsim_core::scenario::CameraSpec;
 use camsim_io::{
-    camera_file::read_camera_toml,
+    formats::reading::read_camera_toml,
     kernel_file::load_kernel,
     lens_table::{lens_table_csv, load_lens_table},
     scenario_file::{read_cameras, read_rig},

@@ -4,7 +4,7 @@ use camsim_core::flight_log::{FlightLog, LogRow, Note, RawAttitude, RawRow};
 use glam::{DQuat, DVec3, EulerRot};
 
 use super::RawLog;
-use crate::calibration::axes::enu_from_flu;
+use crate::formats::axes::enu_from_flu;
 
 /// Rows that are looked at.
 const MAX_ROWS: usize = 2000;

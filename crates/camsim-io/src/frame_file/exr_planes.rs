@@ -47,14 +47,19 @@ pub(crate) struct ExrPlanes {
 
 /// Reads all parts of a file.
 pub(crate) fn read_exr(path: &Path) -> Result<ExrPlanes, FrameFileError> {
-    let image = read_all_flat_layers_from_file(path).map_err(|error| {
+    read(path).map_err(|error| {
         let fix = match &error {
             exr::error::Error::NotSupported(_) => "write it with ZIP compression, and not deep",
             exr::error::Error::Io(_) => "paths are relative to FRAME.toml",
             _ => "it is cut off, or no EXR",
         };
         failure(path, format!("cannot be read as EXR: {error}; {fix}"))
-    })?;
+    })
+}
+
+/// As [`read_exr`], with the bare error.
+pub(crate) fn read(path: &Path) -> exr::error::Result<ExrPlanes> {
+    let image = read_all_flat_layers_from_file(path)?;
     let has_several_parts = image.layer_data.len() > 1;
     let display = image.attributes.display_window;
     let middle = |from: i32, length: usize| f64::from(from) + 0.5 * (length as f64 - 1.0);

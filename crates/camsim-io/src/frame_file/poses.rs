@@ -9,7 +9,7 @@ use super::{
     FrameFileError, TrajectoryFormat,
     columns::{TableColumn, parse_column},
 };
-use crate::csv_table::open_table;
+use crate::table::open_table;
 
 /// Required columns, in the order of the slots of [`ColumnIndices`].
 const COLUMNS: [&str; 8] = ["t_s", "x", "y", "z", "qw", "qx", "qy", "qz"];

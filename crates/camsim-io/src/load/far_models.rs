@@ -7,7 +7,7 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use crate::wording::rounded;
+use crate::text::wording::rounded;
 
 /// Distance from the flight that is never far, metres.
 const NEAR_M: f64 = 1000.0;

@@ -10,8 +10,8 @@ use camsim_core::{
 
 use super::LoadError;
 use crate::{
-    csv_table::open_table,
     frame_file::columns::{TableColumn, parse_column},
+    table::open_table,
 };
 
 /// A vignette whose largest value is below this may have fewer bits than it is stored in.

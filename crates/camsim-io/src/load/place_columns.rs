@@ -2,7 +2,7 @@
 
 use camsim_core::scenario::PatternCentre;
 
-use crate::csv_table::finite;
+use crate::table::finite;
 
 /// North, east, down, metres; latitude, longitude, degrees, and height, metres.
 pub(super) const NAMES: [[&str; 3]; 2] = [["n_m", "e_m", "d_m"], ["lat_deg", "lon_deg", "height_m"]];

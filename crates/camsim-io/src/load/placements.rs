@@ -6,7 +6,7 @@ use super::{
     LoadError,
     place_columns::{NAMES, Place, PlaceColumns, check_names},
 };
-use crate::csv_table::{finite, open_table};
+use crate::table::{finite, open_table};
 
 /// Pose and scale of one copy of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]

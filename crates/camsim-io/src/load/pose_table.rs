@@ -11,8 +11,8 @@ use super::{
     scene::position_ned_m,
 };
 use crate::{
-    csv_table::{finite, open_table},
     frame_file::columns::{TableColumn, parse_column},
+    table::{finite, open_table},
 };
 
 /// Rows of a table of poses.

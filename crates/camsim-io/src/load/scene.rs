@@ -26,7 +26,7 @@ use crate::{
     gltf_file::{GltfOptions, MAX_RADIUS_M, read_moving_gltf},
     pictures::read_texture,
     terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
-    wording::joined_notes,
+    text::wording::joined_notes,
 };
 
 /// Reads all files that `[scene]` names. Returns the scene, the summary of the terrain, and notes.

@@ -16,7 +16,7 @@ use super::{
     place_columns::{PlaceColumns, check_names},
     scene::{position_ned_m, undulation_m},
 };
-use crate::{board_file::read_board, csv_table::open_table};
+use crate::{board_file::read_board, table::open_table};
 
 /// Advice in messages about the header.
 const COLUMNS: &str = "give a header with n_m,e_m,d_m or lat_deg,lon_deg,height_m and, if wanted, name";

@@ -5,7 +5,7 @@ use camsim_core::{
     scenario::{CameraSpec, Reset},
 };
 
-use crate::{unlikely_camera, wording::rounded};
+use crate::{text::wording::rounded, unlikely_camera};
 
 /// What to do where a size has been changed without the calibration.
 const RESIZE_ADVICE: &str = " (to make the pictures of a camera smaller or larger with its calibration, leave \

@@ -14,7 +14,7 @@ use super::{
     grid_tiles::{self, TileIndex},
     tile::Tile,
 };
-use crate::wording::joined_notes;
+use crate::text::wording::joined_notes;
 
 /// Range of plausible heights, metres: from below the deepest sea to above the highest mountain. Others are
 /// undeclared no-data values.

@@ -12,7 +12,7 @@ use super::{
     units::{HEIGHT_UNITS, SAME_UNIT_M, metres_per_unit_code, metres_per_unit_name},
     vertical_crs::StatedVerticalCrs,
 };
-use crate::wording::range;
+use crate::text::wording::range;
 
 /// A unit in metres, with what states it.
 type Stated = (String, f64);

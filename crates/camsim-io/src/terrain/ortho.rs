@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     pictures::{PictureError, StoredPicture, read_stored},
-    wording::joined_notes,
+    text::wording::joined_notes,
 };
 
 /// An ortho-image.

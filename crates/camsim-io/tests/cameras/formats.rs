@@ -2,7 +2,7 @@
 
 use camsim_core::scenario::LensModel::{BrownConrady, KannalaBrandt, Pinhole};
 use camsim_core::scenario::Readout;
-use camsim_io::camera_file::CameraFormat;
+use camsim_io::formats::reading::CameraFormat;
 
 use super::Expected::{Fps, Intrinsics, Lens, Note, Readout as Ms, Size, Without};
 use super::{check, import, read, refused};

@@ -25,7 +25,7 @@ fn encodings_are_accepted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("utf16.yaml");
     std::fs::write(&path, CHAIN.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>()).unwrap();
-    let error = camsim_io::camera_file::import_camera(&path).unwrap_err().to_string();
+    let error = camsim_io::formats::reading::import_camera(&path).unwrap_err().to_string();
     assert!(error.contains("utf16.yaml"), "{error}");
 }
 

@@ -401,8 +401,8 @@ mod tests {
             .iter()
             .zip(["S3FishEye5ParamCam-OpenCV.xml", "S3FishEye5ParamCam-AgisoftLens.xml"])
         {
-            let imported =
-                camsim_io::camera_file::import_camera(&data.join("camsim").join(file)).expect("a camera");
+            let imported = camsim_io::formats::reading::import_camera(&data.join("camsim").join(file))
+                .expect("a camera");
             let own = &calibration.camera;
             let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
             assert!(near(&own.focal_px, &imported.focal_px), "{file}");

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camsim_core::scenario::{CameraSpec, PhotometricSpec};
-use camsim_io::{camera_file::import_camera_as, scenario_file::read_checked_camera};
+use camsim_io::{formats::reading::import_camera_as, scenario_file::read_checked_camera};
 use toml::{Table, Value};
 
 use crate::{

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::{FrameEntry, key_error};
 use crate::{
-    csv_table::open_table,
     frame_file::{
         FrameFileError, NameUnit,
         columns::{TableColumn, parse_column},
         poses::split_words,
     },
+    table::open_table,
 };
 
 /// A picture, with its time if it has one.

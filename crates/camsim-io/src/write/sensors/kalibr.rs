@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use camsim_core::scenario::{ImuSpec, TriadSpec};
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::text::real;
+use crate::text::numbers::real;
 
 /// The four figures of Kalibr's noise model, in continuous time: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz), m/s^2/sqrt(Hz),
 /// m/s^3/sqrt(Hz).

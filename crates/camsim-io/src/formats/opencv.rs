@@ -1,0 +1,4 @@
+//! OpenCV.
+
+pub(crate) mod read;
+pub(crate) mod write;
