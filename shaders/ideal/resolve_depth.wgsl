@@ -6,7 +6,7 @@
 // Sample positions from the pixel centre, pixels.
 const SAMPLE_OFFSETS_X = vec4f(-0.125, 0.375, -0.375, 0.125);
 const SAMPLE_OFFSETS_Y = vec4f(-0.375, -0.125, 0.125, 0.375);
-// Inverse depths that differ by no more than this share of the nearest one belong to one surface.
+// Inverse depths that differ by no more than this fraction of the nearest one belong to one surface.
 const ONE_SURFACE: f32 = 0.02;
 
 // One triangle that covers the target.

@@ -127,7 +127,7 @@ pub fn with_reference(mut scenario: Scenario) -> Result<Scenario, Failure> {
     }
 }
 
-/// Standard error of a reference pixel, as a share of `quality.max_error_dn`.
+/// Standard error of a reference pixel, as a fraction of `quality.max_error_dn`.
 const SHARE_OF_TOLERANCE: f64 = 0.25;
 
 /// Side limit of ideal frames, which are not drawn here.

@@ -138,7 +138,7 @@ fn stmaps_are_lens_tables() {
         out.lines().skip(1).flat_map(|line| line.split(',')).map(|cell| cell.parse().unwrap()).collect()
     };
     for (a, b) in pixels(&camera).iter().zip(pixels(&table)) {
-        // Floats of shares, and a spline between pixels.
+        // Floats of fractions, and a spline between pixels.
         assert!((a - b).abs() < 1e-3, "{a} {b}");
     }
 }

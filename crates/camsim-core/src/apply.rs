@@ -189,13 +189,13 @@ impl<'a> Pipeline<'a> {
         self.nodes
     }
 
-    /// For a flow: the first and last instant that is read, as shares of the interval after the ideal frame.
+    /// For a flow: the first and last instant that is read, as fractions of the interval after the ideal frame.
     /// Outside of 0 to 1 the flow is extrapolated.
     #[must_use]
-    pub fn flow_shares(&self) -> Option<[f64; 2]> {
+    pub fn flow_fractions(&self) -> Option<[f64; 2]> {
         let (first_s, last_s) = self.shutter.window_s();
-        let shares = [first_s, last_s].map(|at_s| self.flow_share(at_s - self.frame.instant_s));
-        self.flow.as_ref().map(|_| [shares[0].min(shares[1]), shares[0].max(shares[1])])
+        let fractions = [first_s, last_s].map(|at_s| self.flow_fraction(at_s - self.frame.instant_s));
+        self.flow.as_ref().map(|_| [fractions[0].min(fractions[1]), fractions[0].max(fractions[1])])
     }
 
     /// Source of a pixel in the ideal frame at exposure phase `phase` (-0.5 is the begin, 0.5 the end).
@@ -218,8 +218,8 @@ impl<'a> Pipeline<'a> {
         let ideal = &self.frame.geometry;
         let holes = &self.frame.holes;
         if let Some(flow) = &self.flow {
-            let share = self.flow_share(dt_s - self.frame.instant_s);
-            return flow.source(ideal.px_from_point(uv.extend(1.0)), share, &self.depth(), holes, ideal);
+            let fraction = self.flow_fraction(dt_s - self.frame.instant_s);
+            return flow.source(ideal.px_from_point(uv.extend(1.0)), fraction, &self.depth(), holes, ideal);
         }
         if self.solver == Solver::Reproject {
             return self.edges.source(
@@ -248,8 +248,8 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// Share of the flow's interval at a time; 0 without a flow.
-    fn flow_share(&self, dt_s: f64) -> f64 {
+    /// Fraction of the flow's interval at a time; 0 without a flow.
+    fn flow_fraction(&self, dt_s: f64) -> f64 {
         if let Motion::Flow(flow) = self.motion { dt_s / flow.interval_s } else { 0.0 }
     }
 
@@ -402,11 +402,11 @@ impl<'a> Pipeline<'a> {
         }
         let half_s = 0.5 * self.shutter.exposure_s();
         if let Some(flow) = &self.flow {
-            let shares = [-half_s, half_s]
-                .map(|from_middle_s| self.flow_share(dt_s + from_middle_s - self.frame.instant_s));
+            let fractions = [-half_s, half_s]
+                .map(|from_middle_s| self.flow_fraction(dt_s + from_middle_s - self.frame.instant_s));
             return flow.may_separate(
                 self.frame.geometry.px_from_point(uv.extend(1.0)),
-                shares,
+                fractions,
                 EDGE_PARALLAX_PX,
             );
         }
@@ -433,7 +433,7 @@ impl<'a> Pipeline<'a> {
         let pixel = [DVec2::new(1.0 / focal.x, 0.0), DVec2::new(0.0, 1.0 / focal.y)];
         if let Some(flow) = &self.flow {
             let source_from_ray =
-                flow.source_from_ray(source.position_px, self.flow_share(dt_s - self.frame.instant_s));
+                flow.source_from_ray(source.position_px, self.flow_fraction(dt_s - self.frame.instant_s));
             let [dx, dy] = pixel.map(|d| source_from_ray * (self.frame.geometry.focal_px * (uv_from_px * d)));
             return Footprint::new(dx, dy, TapStage::SplineOrGrid { most: MAX_TAPS });
         }

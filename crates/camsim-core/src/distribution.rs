@@ -6,7 +6,7 @@ use crate::noise::{camera_seed, sample_words, upper_quantile, upper_tail};
 
 /// Stream of [`sample_words`], apart from those of sensors.
 const STREAM: u32 = 0x6472_6177;
-/// Smallest share of a normal distribution that its clip may leave.
+/// Smallest fraction of a normal distribution that its clip may leave.
 const MIN_CLIPPED_SHARE: f64 = 1e-9;
 /// Largest span of [`Distribution::Integer`]: its numbers are equally likely to one part in 2^16.
 const MAX_SPAN: i64 = 1 << 32;
@@ -98,8 +98,8 @@ impl Distribution {
                 if low.is_nan() || high.is_nan() || low >= high {
                     return Err(format!("has clip = [{low}, {high}]: write the lower number first"));
                 }
-                match clipped_share(mean, sigma, clip) {
-                    share if share >= MIN_CLIPPED_SHARE => Ok(()),
+                match clipped_fraction(mean, sigma, clip) {
+                    fraction if fraction >= MIN_CLIPPED_SHARE => Ok(()),
                     _ => Err(format!("of {mean} +- {sigma} hardly ever lies in its clip [{low}, {high}]")),
                 }
             }
@@ -116,7 +116,7 @@ impl Distribution {
         }
     }
 
-    /// The value below which a share `unit`, in (0, 1), of the values lies. For legal numbers ([`Self::check`]).
+    /// The value below which a fraction `unit`, in (0, 1), of the values lies. For legal numbers ([`Self::check`]).
     ///
     /// Values but whole ones are rounded to 12 digits, so that machines whose logarithms differ in the last bit
     /// agree, and so that decimal text holds them exactly.
@@ -139,19 +139,19 @@ impl Distribution {
     }
 }
 
-/// The number of the first of these shares, which need not sum to 1, that reaches a share `unit` of their sum.
-/// Those of share 0 are never chosen.
+/// The number of the first of these shares, which need not sum to 1, that reaches a fraction `unit` of their sum.
+/// Those of fraction 0 are never chosen.
 #[must_use]
-pub fn choose(shares: &[f64], unit: f64) -> usize {
-    let mut left = unit * shares.iter().sum::<f64>();
-    for (i, share) in shares.iter().enumerate() {
-        if left < *share {
+pub fn choose(fractions: &[f64], unit: f64) -> usize {
+    let mut left = unit * fractions.iter().sum::<f64>();
+    for (i, fraction) in fractions.iter().enumerate() {
+        if left < *fraction {
             return i;
         }
-        left -= share;
+        left -= fraction;
     }
     // Rounding may leave a rest.
-    shares.iter().rposition(|share| *share > 0.0).unwrap_or(0)
+    fractions.iter().rposition(|fraction| *fraction > 0.0).unwrap_or(0)
 }
 
 /// A number to 12 digits, as [`Distribution::quantile`] rounds.
@@ -170,8 +170,8 @@ fn lower_tail(z: f64) -> f64 {
     if z < 0.0 { upper_tail(-z) } else { 1.0 - upper_tail(z) }
 }
 
-/// Share of a normal distribution within its clip.
-fn clipped_share(mean: f64, sigma: f64, clip: [f64; 2]) -> f64 {
+/// Fraction of a normal distribution within its clip.
+fn clipped_fraction(mean: f64, sigma: f64, clip: [f64; 2]) -> f64 {
     let [low, high] = clip.map(|end| (end - mean) / sigma);
     // Tails are exact where they are small.
     if low > 0.0 { upper_tail(low) - upper_tail(high) } else { lower_tail(high) - lower_tail(low) }

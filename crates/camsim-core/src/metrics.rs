@@ -65,7 +65,7 @@ pub struct Comparison {
     pub max: f64,
     /// Structural similarity of luminance; `None` below 11 pixels of width or height.
     pub ssim: Option<f64>,
-    /// Share of pixels in which any sample differs, including alpha, 0..=1.
+    /// Fraction of pixels in which any sample differs, including alpha, 0..=1.
     pub differing: f64,
     /// Number of pixels with a NaN or an infinity in either image. `rmse`, `max` and `ssim` leave out those that
     /// are alike.

@@ -102,8 +102,8 @@ fn half_of(at: impl Fn(f64) -> f64) -> Option<f64> {
     let mut before = f64::INFINITY;
     for (i, value) in (0_u32..).zip(values) {
         if value < 0.5 {
-            let share = (before - 0.5) / (before - value);
-            return Some(STEP * (f64::from(i) - 1.0 + share));
+            let fraction = (before - 0.5) / (before - value);
+            return Some(STEP * (f64::from(i) - 1.0 + fraction));
         }
         before = value;
     }

@@ -120,8 +120,8 @@ pub struct Hit {
     pub texture_uv: [f64; 2],
     /// Factor on the texture's colour at the point.
     pub tint: [f64; 3],
-    /// Share of the light in it that is left in the shadow.
-    pub sky_share: f64,
+    /// Fraction of the light in it that is left in the shadow.
+    pub sky_fraction: f64,
     /// Unit normal of the triangle, NED, on the side that the ray comes from; 0 for a triangle without area.
     pub normal_ned: DVec3,
     /// 0 = terrain, 1 + i = mesh i of the scene.
@@ -410,12 +410,12 @@ fn lens_at_zoom(camera: &CameraSpec, zoom: f64) -> Result<LensInverse, CameraErr
         return Err(CameraError::ZoomValue(zoom));
     };
     let pair = table.windows(2).find(|pair| pair[0].at <= zoom && zoom < pair[1].at);
-    let (low, high, share) = match pair {
+    let (low, high, fraction) = match pair {
         Some([low, high]) => (low, high, (zoom - low.at) / (high.at - low.at)),
         _ if zoom < first.at => (first, first, 0.0),
         _ => (last, last, 0.0),
     };
-    let mix = |a: f64, b: f64| a * (1.0 - share) + b * share;
+    let mix = |a: f64, b: f64| a * (1.0 - fraction) + b * fraction;
     let mix2 = |a: [f64; 2], b: [f64; 2]| [mix(a[0], b[0]), mix(a[1], b[1])];
     let centre = centre_px(camera);
     let principal_px =

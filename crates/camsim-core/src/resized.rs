@@ -241,14 +241,14 @@ impl Resizing {
     fn shutter(&self, camera: &CameraSpec) -> ShutterSpec {
         let mut shutter = camera.shutter.clone();
         let (axis, row_ms) = readout_axis(camera);
-        let share = f64::from(self.part_px[2 + axis]) / f64::from(camera.size_px[axis]);
+        let fraction = f64::from(self.part_px[2 + axis]) / f64::from(camera.size_px[axis]);
         let later_ms = (1.0 / self.scale[axis] - 1.0) * row_ms;
         match shutter.readout {
             Readout::MiddleOutward => shutter.delay_ms -= later_ms,
             Readout::EdgesInward => shutter.delay_ms += later_ms,
             _ => {}
         }
-        shutter.readout_ms *= share;
+        shutter.readout_ms *= fraction;
         if let Some(line_us) = &mut shutter.line_time_us {
             *line_us /= self.scale[axis];
         }

@@ -14,8 +14,8 @@
 //! with s = 1 from the middle outward and -1 from the edges inward; both middle rows have `-delay`.
 //!
 //! **Global reset**: all exposures begin at once and end at the readout of their rows. Their lengths are
-//! `t_e + (share - first share) t_r`, where the share of a row is the factor of `t_r` above, and mid-exposures
-//! are half as far apart: `dt = -delay + share t_r/2`.
+//! `t_e + (fraction - first fraction) t_r`, where the fraction of a row is the factor of `t_r` above, and mid-exposures
+//! are half as far apart: `dt = -delay + fraction t_r/2`.
 
 use crate::scenario::{CameraSpec, FieldOr, FlowInstant, Parity, Readout, Reset, ShutterSpec};
 
@@ -200,7 +200,7 @@ impl Shutter {
     pub fn exposure_row_s(&self, line: u32) -> f64 {
         match self.reset {
             Reset::Rolling => self.exposure_s,
-            Reset::Global => self.exposure_s + (self.share(line) - self.first_share()) * self.readout_s,
+            Reset::Global => self.exposure_s + (self.fraction(line) - self.first_fraction()) * self.readout_s,
         }
     }
 
@@ -223,7 +223,7 @@ impl Shutter {
     pub fn centre_exposure_s(&self) -> f64 {
         match self.reset {
             Reset::Rolling => self.exposure_s,
-            Reset::Global => self.exposure_s - self.first_share() * self.readout_s,
+            Reset::Global => self.exposure_s - self.first_fraction() * self.readout_s,
         }
     }
 
@@ -246,7 +246,7 @@ impl Shutter {
     }
 
     /// Rows or columns of the readout between which the image's centre is, or, of an interlaced image, rows of the
-    /// later field, with the share of the way from the first to the second.
+    /// later field, with the fraction of the way from the first to the second.
     pub fn centre_lines(&self) -> (u32, u32, f64) {
         let last = self.lines() - 1;
         let has_fields = self.row_axis() == RowAxis::Rows && self.interlace_s > 0.0 && last > 0;
@@ -303,11 +303,11 @@ impl Shutter {
             Reset::Rolling => self.readout_s,
             Reset::Global => 0.5 * self.readout_s,
         };
-        self.share(line) * readout_s - self.delay_s
+        self.fraction(line) * readout_s - self.delay_s
     }
 
-    /// Share of the readout time at which a row is read after the image's centre.
-    fn share(&self, line: u32) -> f64 {
+    /// Fraction of the readout time at which a row is read after the image's centre.
+    fn fraction(&self, line: u32) -> f64 {
         let lines = self.lines();
         let position = || (f64::from(line) + 0.5) / f64::from(lines) - 0.5;
         // Rows as far above the middle as others below it have the same time to the last bit.
@@ -320,9 +320,9 @@ impl Shutter {
         }
     }
 
-    /// Share of the row that is read first.
-    fn first_share(&self) -> f64 {
-        self.outer_lines().map(|line| self.share(line)).fold(f64::INFINITY, f64::min)
+    /// Fraction of the row that is read first.
+    fn first_fraction(&self) -> f64 {
+        self.outer_lines().map(|line| self.fraction(line)).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -470,8 +470,9 @@ mod tests {
                     let interlace_ms = FieldOr::Ms(interlace_ms);
                     let spec = ShutterSpec { readout, interlace_ms, first_field, ..spec() };
                     let shutter = Shutter::from_spec(&spec, 30.0, size_px).unwrap();
-                    let (first, second, share) = shutter.centre_lines();
-                    let centre_s = shutter.dt_row_s(first) * (1.0 - share) + shutter.dt_row_s(second) * share;
+                    let (first, second, fraction) = shutter.centre_lines();
+                    let centre_s =
+                        shutter.dt_row_s(first) * (1.0 - fraction) + shutter.dt_row_s(second) * fraction;
                     let is_halved = matches!(readout, Readout::MiddleOutward | Readout::EdgesInward);
                     let is_refused = is_halved && (size_px[1] % 2 == 1 || shutter.interlace_s() > 0.0);
                     assert!(

@@ -22,13 +22,13 @@ pub fn may_step(inverse_depths: [f64; 3]) -> bool {
     bends(inverse_depths, STEP)
 }
 
-/// Whether three equally spaced inverse depths bend by more than `share` of the nearest one.
-pub fn bends([a, b, c]: [f64; 3], share: f64) -> bool {
-    (a - 2.0 * b + c).abs() > share * a.max(b).max(c)
+/// Whether three equally spaced inverse depths bend by more than `fraction` of the nearest one.
+pub fn bends([a, b, c]: [f64; 3], fraction: f64) -> bool {
+    (a - 2.0 * b + c).abs() > fraction * a.max(b).max(c)
 }
 
 /// Whether there is a step between two rays with the given inverse depths (0 for the sky). `between` returns
-/// the inverse depth of the ray at a share of the way.
+/// the inverse depth of the ray at a fraction of the way.
 pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
     let differ = |a: f64, b: f64| (a - b).abs() > STEP * a.max(b);
     let (mut before, mut after) = ((0.0, from), (1.0, to));
@@ -36,8 +36,8 @@ pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
         if !differ(before.1, after.1) {
             return false;
         }
-        let share = 0.5 * (before.0 + after.0);
-        let middle = (share, between(share));
+        let fraction = 0.5 * (before.0 + after.0);
+        let middle = (fraction, between(fraction));
         // The step is in the half with the larger change.
         if (before.1 - middle.1).abs() >= (middle.1 - after.1).abs() {
             after = middle

@@ -243,7 +243,7 @@ pub fn reproject_nodes(
 pub fn parabola_through([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
     let slope = 4.0 * middle - 3.0 * begin - end;
     let bend = 2.0 * begin + 2.0 * end - 4.0 * middle;
-    move |share| begin + share * (slope + share * bend)
+    move |fraction| begin + fraction * (slope + fraction * bend)
 }
 
 /// Source of a ray whose surface has inverse depth `key_inverse_depth` (1/m) in the key frame: the last step
@@ -393,7 +393,7 @@ impl ColorImage<'_> {
     #[must_use]
     pub fn over_area(&self, position_px: DVec2, sides_px: DVec2) -> DVec3 {
         let first = (position_px - 0.5 * (sides_px + 1.0)).floor() + 1.0;
-        // Overlap of the pixel with the rectangle, as a share of the rectangle.
+        // Overlap of the pixel with the rectangle, as a fraction of the rectangle.
         let weight = |k: usize, px: f64| {
             (0.5 * (sides_px[k] + 1.0) - (px - position_px[k]).abs()).clamp(0.0, 1.0) / sides_px[k]
         };

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_have_their_shares_and_moments() {
+    fn draws_have_their_fractions_and_moments() {
         const FRAMES: u32 = 40_000;
         let timing = TimingSpec {
             jitter_ms: 2.0,
@@ -246,12 +246,12 @@ mod tests {
         };
         let camera = camera(timing);
         let faults = faults(&camera);
-        let share = |is: &dyn Fn(u64) -> bool| {
+        let fraction = |is: &dyn Fn(u64) -> bool| {
             (0..FRAMES).filter(|&frame| is(frame.into())).count() as f64 / f64::from(FRAMES)
         };
         // Five standard deviations of each count.
-        assert!((share(&|frame| faults.is_lost(frame)) - 0.1).abs() < 0.0075);
-        let doubled = share(&|frame| matches!(faults.delivery(frame), Delivery::Doubled(_)));
+        assert!((fraction(&|frame| faults.is_lost(frame)) - 0.1).abs() < 0.0075);
+        let doubled = fraction(&|frame| matches!(faults.delivery(frame), Delivery::Doubled(_)));
         assert!((doubled - 0.9 * 0.2).abs() < 0.0096, "{doubled}");
         let mean = |value: &dyn Fn(i64) -> f64| {
             (0..FRAMES).map(|k| value(k.into())).sum::<f64>() / f64::from(FRAMES)

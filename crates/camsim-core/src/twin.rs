@@ -42,8 +42,8 @@ pub fn scenario_of(
         }
         camera.shutter.exposure_ms = 0.0;
         let over_exposure = twin.instants.filter(|_| twin.over.unwrap_or_default() == BurstOver::Exposure);
-        let share = instant.zip(over_exposure).map_or(0.0, |(k, count)| exposure_share(k, count));
-        without_reset(&mut camera.shutter, camera.size_px, share);
+        let fraction = instant.zip(over_exposure).map_or(0.0, |(k, count)| exposure_fraction(k, count));
+        without_reset(&mut camera.shutter, camera.size_px, fraction);
     }
     if twin.is_global() {
         camera.shutter.readout_ms = 0.0;
@@ -89,7 +89,7 @@ fn shift_s(twin: &TwinSpec, shutter: &Shutter, instant: Option<u32>) -> f64 {
     let centre_s = if twin.is_global() { at_s(twin.instant.unwrap_or_default()) } else { 0.0 };
     let (Some(k), Some(count)) = (instant, twin.instants) else { return centre_s };
     match twin.over.unwrap_or_default() {
-        BurstOver::Exposure => centre_s + exposure_share(k, count) * shutter.centre_exposure_s(),
+        BurstOver::Exposure => centre_s + exposure_fraction(k, count) * shutter.centre_exposure_s(),
         BurstOver::Readout if count == 1 => at_s(FlowInstant::Centre),
         BurstOver::Readout => {
             let [first_s, last_s] = [FlowInstant::FirstRow, FlowInstant::LastRow].map(at_s);
@@ -98,16 +98,16 @@ fn shift_s(twin: &TwinSpec, shutter: &Shutter, instant: Option<u32>) -> f64 {
     }
 }
 
-/// Share of the exposure after its middle at which a picture of a burst is taken.
-fn exposure_share(k: u32, count: u32) -> f64 {
+/// Fraction of the exposure after its middle at which a picture of a burst is taken.
+fn exposure_fraction(k: u32, count: u32) -> f64 {
     (f64::from(k) + 0.5) / f64::from(count) - 0.5
 }
 
 /// Makes instants of exposures that begin all at once: the row times are those of a rolling shutter then.
-fn without_reset(shutter: &mut ShutterSpec, size_px: [u32; 2], share: f64) {
+fn without_reset(shutter: &mut ShutterSpec, size_px: [u32; 2], fraction: f64) {
     if shutter.reset == Reset::Global {
         // From row to row half a line, as far as mid-exposures are apart, and what their exposures differ by.
-        shutter.readout_ms = (0.5 + share) * shutter.readout_ms_of(size_px);
+        shutter.readout_ms = (0.5 + fraction) * shutter.readout_ms_of(size_px);
         shutter.line_time_us = None;
         shutter.reset = Reset::Rolling;
     }

@@ -142,9 +142,9 @@ fn judge(set: &Set) -> usize {
     let mut judged = 0;
     for row in 0..32 {
         for column in 0..32 {
-            let share = DVec2::new(f64::from(column), f64::from(row)) / 31.0;
+            let fraction = DVec2::new(f64::from(column), f64::from(row)) / 31.0;
             let pixel =
-                share * DVec2::new(f64::from(camera.size_px[0] - 1), f64::from(camera.size_px[1] - 1));
+                fraction * DVec2::new(f64::from(camera.size_px[0] - 1), f64::from(camera.size_px[1] - 1));
             let answer = camera.unproject(pixel);
             if let Some(ideal) = answer {
                 let image = set.forward(ideal) * camera.focal_px + camera.principal_point_px;

@@ -24,8 +24,8 @@ fn ground() -> Scene {
         let [x, y] =
             [i % SIDE, i / SIDE].map(|k| std::f64::consts::TAU * 6.0 * f64::from(k) / f64::from(SIDE));
         // Rows run from north to south.
-        let share = (f64::from(i / SIDE) / f64::from(SIDE) - 0.5) * 40.0;
-        let level = (0.06 + 0.64 / (1.0 + (-share).exp())) * (1.0 + 0.3 * x.sin() * y.cos());
+        let fraction = (f64::from(i / SIDE) / f64::from(SIDE) - 0.5) * 40.0;
+        let level = (0.06 + 0.64 / (1.0 + (-fraction).exp())) * (1.0 + 0.3 * x.sin() * y.cos());
         [(255.0 * level).round() as u8; 3]
     };
     let rgba8 = (0..SIDE * SIDE).flat_map(|i| {
@@ -111,8 +111,8 @@ fn every_renderer_exposes_a_frame_as_the_reference_does() {
 fn a_frame_by_itself_is_the_frame_of_a_run() {
     for sensor in [None, Some(sensor())] {
         let run = finished(&flight(sensor.clone()), 20..44);
-        let shares = run.iter().filter(|one| one.plan.shared_frames.is_some()).count();
-        assert!(shares > 8, "frames of different exposures share ideal frames: {shares}");
+        let fractions = run.iter().filter(|one| one.plan.shared_frames.is_some()).count();
+        assert!(fractions > 8, "frames of different exposures share ideal frames: {fractions}");
         let times: Vec<f64> = run.iter().map(|one| one.plan.shutter.exposure_s()).collect();
         assert!(times.windows(2).all(|pair| pair[0] != pair[1]), "{times:?}");
         for k in [0, 13, 23] {

@@ -156,13 +156,13 @@ fn read<const N: usize>(values: &[f32], px: DVec2, accepts: impl Fn(usize) -> bo
     if corner.min_element() < 0.0 || corner.x + 1.0 >= width as f64 || corner.y + 1.0 >= height as f64 {
         return None;
     }
-    let share = px - corner;
+    let fraction = px - corner;
     let first = corner.y as usize * width + corner.x as usize;
     let four = [
-        (first, (1.0 - share.x) * (1.0 - share.y)),
-        (first + 1, share.x * (1.0 - share.y)),
-        (first + width, (1.0 - share.x) * share.y),
-        (first + width + 1, share.x * share.y),
+        (first, (1.0 - fraction.x) * (1.0 - fraction.y)),
+        (first + 1, fraction.x * (1.0 - fraction.y)),
+        (first + width, (1.0 - fraction.x) * fraction.y),
+        (first + width + 1, fraction.x * fraction.y),
     ];
     four.iter().all(|&(i, _)| accepts(i)).then(|| {
         std::array::from_fn(|k| four.iter().map(|&(i, weight)| weight * f64::from(values[N * i + k])).sum())

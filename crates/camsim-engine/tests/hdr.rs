@@ -89,7 +89,7 @@ fn a_glint_keeps_its_light_however_it_is_blurred() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_sharp_glint_fills_the_well_and_a_streak_has_its_share_of_the_light() {
+fn a_sharp_glint_fills_the_well_and_a_streak_has_its_fraction_of_the_light() {
     // Sharp: all of its pixels are full.
     for (name, frame) in by_all(&glint(1.0, WHITE_E)) {
         let full = numbers(&frame).iter().filter(|&&dn| dn == WHITE_E as u16).count();

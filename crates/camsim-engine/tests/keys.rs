@@ -70,7 +70,7 @@ fn gathering_from_several_key_frames_agrees_with_its_twin() {
 
 /// The paper's figs. 15, 17 and 19: there the board's far edge is lost and its border smears, because depth
 /// beside the board is taken for the board's. A white board 60 m above black ground: the red value is the
-/// share of the pixel's area and exposure that it covers.
+/// fraction of the pixel's area and exposure that it covers.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn board_edges_are_exact_with_several_key_frames() {
@@ -91,10 +91,10 @@ fn board_edges_are_exact_with_several_key_frames() {
         let near = expected(&sequence, &done.plan);
         let errors: Vec<f64> = near
             .iter()
-            .map(|&(i, share)| (share.x - f64::from(done.frame.color_rgba()[4 * i])).abs())
+            .map(|&(i, fraction)| (fraction.x - f64::from(done.frame.color_rgba()[4 * i])).abs())
             .collect();
         let worst = errors.iter().copied().fold(0.0, f64::max);
-        let covered: f64 = near.iter().map(|(_, share)| share.x).sum();
+        let covered: f64 = near.iter().map(|(_, fraction)| fraction.x).sum();
         let found: f64 = near.iter().map(|&(i, _)| f64::from(done.frame.color_rgba()[4 * i])).sum();
         let psnr = linear_psnr(&done.frame, &near);
         eprintln!(

@@ -56,7 +56,7 @@ fn lamps(side_px: f64, streak_px: f64, above_m: f64, change: impl FnOnce(&mut Ca
 }
 
 /// Light of each quarter of a picture over that of a lamp.
-fn shares(color_rgba: &[f32], side_px: f64) -> [f64; 4] {
+fn fractions(color_rgba: &[f32], side_px: f64) -> [f64; 4] {
     let mut sums = [0.0; 4];
     for (i, pixel) in color_rgba.chunks_exact(4).enumerate() {
         let (x, y) = (i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]);
@@ -66,7 +66,7 @@ fn shares(color_rgba: &[f32], side_px: f64) -> [f64; 4] {
 }
 
 fn worst(found: &[f64; 4]) -> f64 {
-    found.iter().map(|share| (share - 1.0).abs()).fold(0.0, f64::max)
+    found.iter().map(|fraction| (fraction - 1.0).abs()).fold(0.0, f64::max)
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn small_lamps_have_their_light() {
         for side_px in SIDES_PX {
             let sequence = lamps(side_px, streak_px, above_m, |_| {});
             let exact = Oracle::new(sequence.clone()).expect("an oracle");
-            let exact = shares(&exact.render(0, &RenderOptions::default()).color_rgba(), side_px);
+            let exact = fractions(&exact.render(0, &RenderOptions::default()).color_rgba(), side_px);
             eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, reference: {exact:.3?}");
             // Its samples are 1024 a pixel: 256 in all meet a lamp of half a pixel, with 6 % for random ones.
             assert!(worst(&exact) < 0.08, "{side_px} {streak_px} {above_m}: {exact:?}");
@@ -84,7 +84,7 @@ fn small_lamps_have_their_light() {
                 let mut engine = engine();
                 engine.set_backend(place);
                 let found = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
-                let found = shares(&found, side_px);
+                let found = fractions(&found, side_px);
                 eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, {place:?}: {found:.3?}");
                 assert!(worst(&found) < 0.04, "{side_px} {streak_px} {above_m}, {place:?}: {found:?}");
             }
@@ -107,16 +107,16 @@ fn small_lamps_have_their_light_through_a_lens_and_a_readout() {
             });
             let options = RenderOptions { max_samples: 4096, ..RenderOptions::default() };
             let exact = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
-            let exact = shares(exact.color_rgba(), side_px);
+            let exact = fractions(exact.color_rgba(), side_px);
             for place in [Backend::Cpu, Backend::Gpu] {
                 let mut engine = engine();
                 engine.set_backend(place);
                 let found = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
-                let found = shares(&found, side_px);
-                let share: [f64; 4] = std::array::from_fn(|i| found[i] / exact[i]);
-                eprintln!("{name}, {side_px} px, {place:?}: {share:.3?}");
+                let found = fractions(&found, side_px);
+                let fraction: [f64; 4] = std::array::from_fn(|i| found[i] / exact[i]);
+                eprintln!("{name}, {side_px} px, {place:?}: {fraction:.3?}");
                 // Both have 1000 rays or more through a lamp of half a pixel.
-                assert!(worst(&share) < 0.05, "{name} {side_px} {place:?}: {share:?}");
+                assert!(worst(&fraction) < 0.05, "{name} {side_px} {place:?}: {fraction:?}");
             }
         }
     }

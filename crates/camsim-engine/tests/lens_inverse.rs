@@ -123,8 +123,8 @@ fn border_px(camera: &CameraModel) -> Vec<DVec2> {
 fn distance(border: &[DVec2], pixel: DVec2) -> f64 {
     let to_segment = |ends: &[DVec2]| {
         let along = ends[1] - ends[0];
-        let share = ((pixel - ends[0]).dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
-        (ends[0] + along * share - pixel).length()
+        let fraction = ((pixel - ends[0]).dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+        (ends[0] + along * fraction - pixel).length()
     };
     border.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
 }

@@ -1,4 +1,4 @@
-//! Ranges, normals, numbers of objects, and the share of each pixel that its object has, against rays of the
+//! Ranges, normals, numbers of objects, and the fraction of each pixel that its object has, against rays of the
 //! reference renderer and closed forms.
 
 mod common;
@@ -128,8 +128,8 @@ fn wrong_values_are_found() {
     }
 }
 
-/// Share of a pixel's rays that meet the object of its centre, by many rays of the reference renderer.
-fn share(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
+/// Fraction of a pixel's rays that meet the object of its centre, by many rays of the reference renderer.
+fn fraction(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
     let view = oracle.view(0);
     let scene = &oracle.sequence().scene;
     let object = |place: DVec2, phase: f64| {
@@ -147,7 +147,7 @@ fn share(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
 }
 
 #[test]
-fn coverage_is_the_share_of_rays_that_see_the_object() {
+fn coverage_is_the_fraction_of_rays_that_see_the_object() {
     // 30 ms at 36 m/s, 60 m from the upper roof: it moves by two pixels.
     let sequence = over_hills(|scenario| scenario.camera.shutter = rolling(33.0, 30.0));
     let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
@@ -157,11 +157,11 @@ fn coverage_is_the_share_of_rays_that_see_the_object() {
     for (i, &coverage) in coverage.iter().enumerate() {
         let pixel = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
         if coverage < 1.0 {
-            let off = (f64::from(coverage) - share(&oracle, pixel, 12)).abs();
+            let off = (f64::from(coverage) - fraction(&oracle, pixel, 12)).abs();
             (most, squares, mixed) = (most.max(off), squares + off * off, mixed + 1.0);
         } else if i % 3 == 0 {
-            let share = share(&oracle, pixel, 4);
-            assert!(share > 0.93, "{pixel:?}: {share}");
+            let fraction = fraction(&oracle, pixel, 4);
+            assert!(fraction > 0.93, "{pixel:?}: {fraction}");
         }
     }
     let rms = (squares / mixed).sqrt();

@@ -181,7 +181,7 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
         // for itself.
         let steps = blur.solved() as f32 - 1.0;
         phases.push(-0.5);
-        phases.extend([0.25, 0.75].map(|share| ((share * steps).floor() + 0.5) / steps - 0.5 + 1e-5));
+        phases.extend([0.25, 0.75].map(|fraction| ((fraction * steps).floor() + 0.5) / steps - 0.5 + 1e-5));
     }
     let mut worst: Option<CoordErrors> = None;
     for phase in phases {

@@ -66,7 +66,7 @@ fn point_at(frame: &RenderedFrame, at: DVec2) -> Option<DVec3> {
     let (x, y) = (at.x.floor(), at.y.floor());
     let mut sum = (0.0, DVec3::ZERO);
     for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let weight = |offset: u32, share: f64| if offset == 1 { share } else { 1.0 - share };
+        let weight = |offset: u32, fraction: f64| if offset == 1 { fraction } else { 1.0 - fraction };
         let (depth_m, point) = truth(frame, x as u32 + i, y as u32 + j);
         if depth_m == 0.0 {
             return None;

@@ -1,4 +1,4 @@
-//! Pixels at silhouettes against rays cast in f64, each at its own instant: what share of a pixel's area and
+//! Pixels at silhouettes against rays cast in f64, each at its own instant: what fraction of a pixel's area and
 //! exposure each surface has.
 
 mod common;

@@ -88,7 +88,7 @@ fn errors(sequence: &Arc<Sequence>, plane: Plane) -> (Errors, Finished) {
         last = Some(done);
     }
     all.sort_by(f64::total_cmp);
-    let at = |share: f64| all[((all.len() as f64 * share) as usize).min(all.len() - 1)];
+    let at = |fraction: f64| all[((all.len() as f64 * fraction) as usize).min(all.len() - 1)];
     let rms_px = (all.iter().map(|e| e * e).sum::<f64>() / all.len() as f64).sqrt();
     let found = Errors { rms_px, p99_px: at(0.99), max_px: at(1.0), compared: all.len(), missing };
     (found, last.expect("three phases"))

@@ -128,8 +128,8 @@ impl Case {
         let at = |row: u32| {
             view.mid_s(if is_sideways { [row, y.round() as u32] } else { [x.round() as u32, row] })
         };
-        let share = (across - f64::from(row)) / (f64::from(other) - f64::from(row));
-        at(row) + share * (at(other) - at(row))
+        let fraction = (across - f64::from(row)) / (f64::from(other) - f64::from(row));
+        at(row) + fraction * (at(other) - at(row))
     }
 }
 

@@ -70,7 +70,7 @@ pub struct Figures {
     pub psnr_db: Option<f64>,
     /// Structural similarity; null below 11 pixels of width or height.
     pub ssim: Option<f64>,
-    /// Share of pixels that differ at all.
+    /// Fraction of pixels that differ at all.
     pub differing: f64,
     /// Number of pixels with a NaN or an infinity in either picture. RMSE, maximum, PSNR and SSIM leave out
     /// those that are alike.

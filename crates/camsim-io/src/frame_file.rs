@@ -265,7 +265,7 @@ pub struct FrameFile {
     pub motion: Motion,
     /// Fog, for the paper preset.
     pub fog: Option<LinearFog>,
-    /// Share of the pixels whose depth is unknown or sky.
+    /// Fraction of the pixels whose depth is unknown or sky.
     pub without_depth: f64,
     /// Notes about what is not applied, or is unusual.
     pub notes: Vec<String>,

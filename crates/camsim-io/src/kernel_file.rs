@@ -65,7 +65,7 @@ pub fn read_kernel(path: &Path) -> Result<SpreadKernel, KernelFileError> {
 /// Values of red, green and blue, row by row, and the numbers of columns and rows.
 pub type ChannelValues = ([usize; 2], [Vec<f64>; 3]);
 
-/// Reads the values of a picture or of a CSV as they are, those of whole numbers as shares of the largest.
+/// Reads the values of a picture or of a CSV as they are, those of whole numbers as fractions of the largest.
 ///
 /// # Errors
 /// The file cannot be read.

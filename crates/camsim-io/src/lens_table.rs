@@ -10,7 +10,7 @@
 //!
 //! Rows may have any order; every node of the grid must be there once. An EXR is an STmap: for every pixel of the
 //! picture, in channels R and G (or the only two), where the undistorted picture of the same focal lengths and
-//! principal point shows what it sees, in shares of width and height from the lower left corner.
+//! principal point shows what it sees, in fractions of width and height from the lower left corner.
 
 use std::path::{Path, PathBuf};
 
@@ -211,8 +211,8 @@ fn st_map(path: &Path, pixels: &Pixels) -> Result<LensGrid, LensTableError> {
         .iter()
         .zip(&planes[t].values)
         .map(|(s, t)| {
-            let share = DVec2::new(f64::from(*s), 1.0 - f64::from(*t));
-            pixels.distorted(share * pixels.size_px - 0.5)
+            let fraction = DVec2::new(f64::from(*s), 1.0 - f64::from(*t));
+            pixels.distorted(fraction * pixels.size_px - 0.5)
         })
         .collect();
     LensGrid::new(RayChart::Ideal, GridOf::Points, placement, [columns, rows], &values)
@@ -225,8 +225,8 @@ fn st_map(path: &Path, pixels: &Pixels) -> Result<LensGrid, LensTableError> {
 pub fn lens_table_csv(camera: &CameraModel, nodes: u32) -> String {
     let corner = DVec2::from(camera.size_px.map(f64::from)) - 0.5;
     let edge = (0..=64).flat_map(|i| {
-        let share = f64::from(i) / 64.0;
-        let (x, y) = (-0.5 + (corner.x + 0.5) * share, -0.5 + (corner.y + 0.5) * share);
+        let fraction = f64::from(i) / 64.0;
+        let (x, y) = (-0.5 + (corner.x + 0.5) * fraction, -0.5 + (corner.y + 0.5) * fraction);
         [DVec2::new(x, -0.5), DVec2::new(x, corner.y), DVec2::new(-0.5, y), DVec2::new(corner.x, y)]
     });
     let rays: Vec<_> = edge.filter_map(|px| camera.ray(px)).collect();
@@ -239,8 +239,8 @@ pub fn lens_table_csv(camera: &CameraModel, nodes: u32) -> String {
     let reach = 1.02 * rays.iter().map(|ray| place(*ray).abs()).fold(DVec2::splat(0.1), DVec2::max);
     let mut text = format!("{},x_px,y_px\n", if is_wide { "ax_rad,ay_rad" } else { "u,v" });
     for k in 0..nodes * nodes {
-        let share = DVec2::new(f64::from(k % nodes), f64::from(k / nodes)) / f64::from(nodes - 1);
-        let at = reach * (2.0 * share - 1.0);
+        let fraction = DVec2::new(f64::from(k % nodes), f64::from(k / nodes)) / f64::from(nodes - 1);
+        let at = reach * (2.0 * fraction - 1.0);
         let px = match is_wide {
             true => {
                 let theta = at.length();

@@ -324,14 +324,14 @@ pub fn read_terrain_in_light(
         Some(ortho) => {
             notes.extend(ortho.notes.iter().cloned());
             notes.extend((outside_ortho > 0).then(|| {
-                let share = 100.0 * outside_ortho as f64 / (dem.post_count() - heights.voids) as f64;
+                let fraction = 100.0 * outside_ortho as f64 / (dem.post_count() - heights.voids) as f64;
                 let (is, others) = match spec.beyond {
                     Beyond::Grey => ("grey", "\"edge\" or \"void\""),
                     Beyond::Edge => ("of the colours at its border", "\"grey\" or \"void\""),
                     Beyond::Void => ("left out", "\"grey\" or \"edge\""),
                 };
                 format!(
-                    "{}: {share:.2} % of the terrain's area has no ortho-image and is {is} \
+                    "{}: {fraction:.2} % of the terrain's area has no ortho-image and is {is} \
                      (scene.terrain.beyond; alternatives: {others})",
                     ortho.path.display()
                 )

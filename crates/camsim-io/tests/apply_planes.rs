@@ -299,7 +299,7 @@ fn blur_is_the_mean_of_sources_over_the_exposure() {
     assert!(one.len() > 10_000 && mixed.len() > 300, "{} {}", one.len(), mixed.len());
     // 0.008 is measured.
     assert!(rms(&one) < 0.012, "{}", rms(&one));
-    // The share of each surface in the exposure is accurate to about one sample, and to half a texel of its
+    // The fraction of each surface in the exposure is accurate to about one sample, and to half a texel of its
     // silhouette.
     assert!(rms(&mixed) < 0.35, "{}", rms(&mixed));
 }

@@ -122,7 +122,7 @@ fn warped(set: &FrameSeries, data: &Path, from: usize, to: usize) -> (RenderedFr
     (rendered, set.read(data, folder.path(), to, ""))
 }
 
-/// Number of pixels with depth in both frames, the share whose depths agree within 5 %, and their median
+/// Number of pixels with depth in both frames, the fraction whose depths agree within 5 %, and their median
 /// difference of colour.
 fn agreement(rendered: &RenderedFrame, own: &FrameFile) -> (usize, f64, f32) {
     let depth_m = rendered.depth_m().unwrap();

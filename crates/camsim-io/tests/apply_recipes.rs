@@ -110,7 +110,7 @@ fn all_recipes_can_be_read() {
                 file.without_depth < 1.0 && file.frame.inverse_depth.iter().any(|w| *w > 0.0),
                 "{recipe}"
             );
-            // Share of sky in the files written above.
+            // Fraction of sky in the files written above.
             let sky = if recipe.contains("65504") {
                 0.5
             } else if recipe.contains("tiff") {

@@ -241,7 +241,7 @@ fn small_picture(folder: &Path) -> PathBuf {
 fn ground_outside_of_the_ortho_image_follows_the_key() {
     let folder = tempfile::tempdir().unwrap();
     let spec = TerrainSpec { ortho: Some(small_picture(folder.path()).into()), ..spec("ortho/dem.tif") };
-    let share = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
+    let fraction = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
     let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
     for (beyond, expected) in [
         (Beyond::Grey, "is grey"),
@@ -251,7 +251,7 @@ fn ground_outside_of_the_ortho_image_follows_the_key() {
         let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
         let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
         assert!(
-            note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(expected),
+            note.contains(&format!("{fraction:.2} % of the terrain's area")) && note.contains(expected),
             "{note}"
         );
         assert_eq!(loaded.summary.outside_ortho, 96 * 96 - 400);

@@ -230,8 +230,8 @@ impl FaultModel<'_> {
             let offset = DVec2::new(0.5 * n("width") - n("ox"), 0.5 * n("height") - n("oy"))
                 / DVec2::new(n("fx"), n("fy"));
             let ray = if has(Fault::FogCentre) { uv + offset } else { uv };
-            let fog_share = (ray.extend(1.0).length() / inverse_depth / n("fog_end")).clamp(0.0, 1.0);
-            color = color.lerp(255.0 * DVec3::from_array(FOG), fog_share);
+            let fog_fraction = (ray.extend(1.0).length() / inverse_depth / n("fog_end")).clamp(0.0, 1.0);
+            color = color.lerp(255.0 * DVec3::from_array(FOG), fog_fraction);
         }
         let weight = self.vignette(pixel, has(Fault::VignetteJump), has(Fault::VignetteBorder));
         Some((color * weight * n("day_light")).to_array())
@@ -332,8 +332,8 @@ fn papers_methods_agree_with_the_reference_program_up_to_known_faults() {
                 // Without a source in the ideal frame camsim gives alpha 0; the reference program gives
                 // black, fogged black, or red for "no convergence".
                 let fogged = golden.paper.fog.is_some() && {
-                    let fog_share = theirs[2] / FOG[2];
-                    fog_share > 0.0 && difference(theirs, FOG.map(|v| fog_share * v)) <= TOLERANCE_DN
+                    let fog_fraction = theirs[2] / FOG[2];
+                    fog_fraction > 0.0 && difference(theirs, FOG.map(|v| fog_fraction * v)) <= TOLERANCE_DN
                 };
                 empty += u32::from(red || black || fogged);
                 unexplained_count += u32::from(!red && !black && !fogged);

@@ -117,7 +117,7 @@ impl Plot {
 
     /// The corner in which the legend hides the fewest points of the curves.
     fn emptiest_corner(&self, x: &Range<f64>, y: &Range<f64>) -> SeriesLabelPosition {
-        let share = |value: f64, range: &Range<f64>, log: bool| match log {
+        let fraction = |value: f64, range: &Range<f64>, log: bool| match log {
             false => (value - range.start) / (range.end - range.start),
             true => (value / range.start).ln() / (range.end / range.start).ln(),
         };
@@ -125,7 +125,7 @@ impl Plot {
         for series in &self.series {
             let points: Vec<_> = self
                 .shown(series)
-                .map(|(u, v)| (share(u, x, self.log[0]), share(v, y, self.log[1])))
+                .map(|(u, v)| (fraction(u, x, self.log[0]), fraction(v, y, self.log[1])))
                 .collect();
             if series.joined {
                 // Points on the joining lines count too.

@@ -58,11 +58,11 @@ const REACH: i64 = 5;
 const LEAST_LINES: usize = 12;
 
 /// Mean distance of an edge from where it should be, along the rows or columns of pixels that cross it more
-/// steeply; `None` with few of them in the picture. Light changes from one side to the other once: the share
+/// steeply; `None` with few of them in the picture. Light changes from one side to the other once: the fraction
 /// of it that is on the first side, added up, is the edge's place in a line of pixels. What a pixel's filter
 /// leaves of its phase is lost in the mean, because neighbouring lines have other phases.
 fn edge_error(frame: &RenderedFrame, eye: &Eye, from_m: DVec2, to_m: DVec2) -> Option<f64> {
-    let [from_px, to_px] = [0.1, 0.9].map(|share| eye.px(from_m.lerp(to_m, share)));
+    let [from_px, to_px] = [0.1, 0.9].map(|fraction| eye.px(from_m.lerp(to_m, fraction)));
     // Across the edge by columns (0) or rows (1).
     let axis = usize::from((to_px - from_px).x.abs() > (to_px - from_px).y.abs());
     let [first, last] = [

@@ -127,17 +127,17 @@ impl FramePlan {
     /// nothing is predicted.
     #[must_use]
     pub fn not_in_the_picture(&self) -> Vec<String> {
-        let Predicted { probes, silhouette_share, silhouettes, terrain, .. } = self.predicted;
+        let Predicted { probes, silhouette_fraction, silhouettes, terrain, .. } = self.predicted;
         if probes == 0 {
             return Vec::new();
         }
         let paper = (self.preset == Preset::Paper)
             .then(|| "vignette, fog and stored colours as the paper has them".to_owned());
-        let ignored = (silhouettes.is_none() && silhouette_share > 0.0).then(|| {
+        let ignored = (silhouettes.is_none() && silhouette_fraction > 0.0).then(|| {
             let of_terrain = if terrain.is_some() { ", and how coarse the terrain's silhouettes are" } else { "" };
             format!(
                 "silhouettes, which at least {:.0} % of the pixels are at{of_terrain}: their error is not predicted",
-                100.0 * silhouette_share
+                100.0 * silhouette_fraction
             )
         });
         let shadows = self.shadows.map(|_| {

@@ -8,7 +8,7 @@ use super::keys::{Table, Words};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutoExposureSpec {
-    /// Metered part of the picture: left, top, right, bottom, as shares of its sides.
+    /// Metered part of the picture: left, top, right, bottom, as fractions of its sides.
     #[key(
         default = [0.0, 0.0, 1.0, 1.0],
         step = 0.005,
@@ -20,7 +20,7 @@ pub struct AutoExposureSpec {
     pub window: [f64; 4],
     /// Weights within the metered window.
     pub weights: MeterWeights,
-    /// Mean that is aimed at, as a share of white. Of an image sensor it is a share of the range of its
+    /// Mean that is aimed at, as a fraction of white. Of an image sensor it is a fraction of the range of its
     /// numbers above black.
     #[key(
         default = 0.18,
@@ -51,7 +51,7 @@ pub struct AutoExposureSpec {
         names = "min max"
     )]
     pub gain: [f64; 2],
-    /// Share of the error's logarithm that each frame corrects.
+    /// Fraction of the error's logarithm that each frame corrects.
     #[key(default = 0.2, step = 0.005, above = 0.0, max = 1.0, hint = "1 corrects all of the error at once")]
     pub speed: f64,
     /// Frames from the metered picture to the one whose exposure follows from it.

@@ -44,7 +44,7 @@ pub struct ImageSensorSpec {
     #[key(step = 0.05, above = 0.0, hint = "leave it out if it is unknown", example = "4.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
-    /// Share of the light that passes the lens, for `white_lux`.
+    /// Fraction of the light that passes the lens, for `white_lux`.
     #[key(default = 1.0, step = 0.005, above = 0.0, max = 1.0, hint = "1 is all of it")]
     pub lens_transmission: f64,
     /// Wavelength of the light of `white_w_m2`.
@@ -103,15 +103,15 @@ pub struct ImageSensorSpec {
     /// Constant offsets of columns: standard deviation.
     #[key(unit = "e-", step = 0.05, min = 0.0, hint = "0 is none")]
     pub column_offset_e: f64,
-    /// Share of the pixels whose dark current is much larger.
-    #[key(step = 0.0001, min = 0.0, max = 1.0, hint = "it is a share of the pixels")]
+    /// Fraction of the pixels whose dark current is much larger.
+    #[key(step = 0.0001, min = 0.0, max = 1.0, hint = "it is a fraction of the pixels")]
     pub hot_pixels: f64,
     /// Mean dark current of hot pixels at `dark_reference_c`. Their dark currents are exponentially
     /// distributed about it.
     #[key(unit = "e-/s", step = 10.0, min = 0.0, hint = "0 is none")]
     pub hot_e_s: f64,
-    /// Share of the pixels that always show the black level.
-    #[key(step = 0.0001, min = 0.0, max = 1.0, hint = "it is a share of the pixels")]
+    /// Fraction of the pixels that always show the black level.
+    #[key(step = 0.0001, min = 0.0, max = 1.0, hint = "it is a fraction of the pixels")]
     pub dead_pixels: f64,
     /// Largest number of electrons. Left out: that of `model`, else white's, or no limit where
     /// `gain_e_per_dn` is given.
@@ -148,7 +148,7 @@ pub struct ImageSensorSpec {
     pub bits: Option<u32>,
     /// Curve from the converter's numbers to those of the output.
     pub companding: Companding,
-    /// Corners of the piecewise linear curve of `companding`, as shares of both ranges.
+    /// Corners of the piecewise linear curve of `companding`, as fractions of both ranges.
     #[key(step = 0.01, example = "[[0, 0], [0.2, 0.5], [1, 1]]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub companding_points: Vec<[f64; 2]>,
@@ -302,19 +302,19 @@ pub struct FlickerSpec {
     /// Periods of the lamps a second: twice the frequency of the mains.
     #[key(default = 100.0, unit = "Hz", above = 0.0, hint = "100 is that of 50 Hz mains")]
     pub hz: f64,
-    /// Share of the light that flickers.
+    /// Fraction of the light that flickers.
     #[key(
         default = 1.0,
         step = 0.01,
         min = 0.0,
         max = 1.0,
-        hint = "it is the share of the light that flickers"
+        hint = "it is the fraction of the light that flickers"
     )]
     pub depth: f64,
     /// Course of the flickering light.
     pub wave: FlickerWave,
-    /// Share of the period in which "pulse" is alight.
-    #[key(default = 0.5, step = 0.01, above = 0.0, max = 1.0, hint = "it is a share of the period")]
+    /// Fraction of the period in which "pulse" is alight.
+    #[key(default = 0.5, step = 0.01, above = 0.0, max = 1.0, hint = "it is a fraction of the period")]
     pub duty: f64,
     /// Phase at the log's first good row: of the brightest instant, or of the begin of the pulse.
     #[key(unit = "deg")]

@@ -62,7 +62,7 @@ pub struct PointSpreadSpec {
     /// Values of `kernel` along the side of a pixel.
     #[key(default = 1, step = 0.1, min = 1, max = MAX_OVERSAMPLING, hint = "1 is a kernel of whole pixels")]
     pub kernel_oversampling: u32,
-    /// Share of the light that is spread evenly over the picture.
-    #[key(step = 0.001, min = 0.0, below = 1.0, hint = "it is a share of the light")]
+    /// Fraction of the light that is spread evenly over the picture.
+    #[key(step = 0.001, min = 0.0, below = 1.0, hint = "it is a fraction of the light")]
     pub glare: f64,
 }

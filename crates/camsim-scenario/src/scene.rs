@@ -247,12 +247,12 @@ pub struct BoardSpec {
     #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.025")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diameter_m: Option<f64>,
-    /// Gap between tags of an AprilGrid, as a share of their side. Left out: 0.3.
+    /// Gap between tags of an AprilGrid, as a fraction of their side. Left out: 0.3.
     #[key(
         step = 0.005,
         above = 0.0,
         max = 1.0,
-        hint = "give the gap between tags as a share of size_m",
+        hint = "give the gap between tags as a fraction of size_m",
         example = "0.3"
     )]
     #[serde(skip_serializing_if = "Option::is_none")]

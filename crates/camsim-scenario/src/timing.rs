@@ -27,15 +27,15 @@ pub struct TimingSpec {
     #[key(example = "[12, 13]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drop: Vec<u64>,
-    /// Share of the other frames that do not arrive.
-    #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a share of the frames")]
+    /// Fraction of the other frames that do not arrive.
+    #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a fraction of the frames")]
     pub drop_probability: f64,
     /// Numbers of frames that show the picture of the frame that arrived before them once more.
     #[key(example = "[20]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub double: Vec<u64>,
-    /// Share of the other frames that show the picture before them once more.
-    #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a share of the frames")]
+    /// Fraction of the other frames that show the picture before them once more.
+    #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a fraction of the frames")]
     pub double_probability: f64,
     /// Name of the trigger that the camera shares with others. Cameras of a rig with the same one are late
     /// together, and miss triggers together. Left out: a trigger of its own.
@@ -46,8 +46,8 @@ pub struct TimingSpec {
     #[key(example = "[30]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub miss: Vec<u64>,
-    /// Share of the other triggers that do not come.
-    #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a share of the triggers")]
+    /// Fraction of the other triggers that do not come.
+    #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a fraction of the triggers")]
     #[serde(skip_serializing_if = "is_zero")]
     pub miss_probability: f64,
     /// Whose errors stamps have: the camera's or the trigger's.

@@ -103,8 +103,8 @@ fn folders() -> Vec<PathBuf> {
         &[]
     } else {
         &[
-            "/usr/share/fonts",
-            "/usr/local/share/fonts",
+            "/usr/fraction/fonts",
+            "/usr/local/fraction/fonts",
             "/run/host/fonts",
             "/run/current-system/sw/share/X11/fonts",
         ]
@@ -116,7 +116,7 @@ fn folders() -> Vec<PathBuf> {
     } else {
         vec![
             folder_in("XDG_DATA_HOME", "fonts"),
-            folder_in("HOME", ".local/share/fonts"),
+            folder_in("HOME", ".local/fraction/fonts"),
             folder_in("HOME", ".fonts"),
         ]
     };

@@ -11,7 +11,7 @@ pub const ZOOM: [f64; 2] = [0.2, 500.0];
 pub const DEPRESSION_DEG: [f64; 2] = [-30.0, 90.0];
 /// Rotation per point of drag, degrees.
 const DEG_PER_POINT: f64 = 0.4;
-/// Distance of the near plane as a share of the distance to the target.
+/// Distance of the near plane as a fraction of the distance to the target.
 const NEAR_SHARE: f64 = 0.01;
 /// Largest distance of the target from the scene's centre, in radii of the scene.
 const MAX_TARGET_RADII: f64 = 3.0;

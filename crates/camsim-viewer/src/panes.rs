@@ -118,7 +118,7 @@ fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
 }
 
 /// Colour scale from dark blue (0) to yellow (1).
-fn ramp_color(share: f64) -> egui::Color32 {
-    let [r, g, b] = crate::engine::ramp(share);
+fn ramp_color(fraction: f64) -> egui::Color32 {
+    let [r, g, b] = crate::engine::ramp(fraction);
     egui::Color32::from_rgb(r, g, b)
 }

@@ -223,9 +223,10 @@ fn channels(loaded: &Loaded, sample_times: &SampleTimes) -> Vec<Channel> {
     let focal_px = 0.5 * (camera.focal_px[0] + camera.focal_px[1]);
     let (exposure_s, readout_s) = (1e-3 * camera.shutter.exposure_ms, 1e-3 * camera.readout_ms());
     let image_speed = over(&sample_times.ground_s, &|t_s| image_speed_px_s(loaded, focal_px, t_s));
-    for (name, share_s) in [("blur in the middle, px", exposure_s), ("row skew in the middle, px", readout_s)]
+    for (name, fraction_s) in
+        [("blur in the middle, px", exposure_s), ("row skew in the middle, px", readout_s)]
     {
-        plain(name, image_speed.iter().map(|[t_s, speed]| [*t_s, speed * share_s]).collect(), None);
+        plain(name, image_speed.iter().map(|[t_s, speed]| [*t_s, speed * fraction_s]).collect(), None);
     }
     channels
 }

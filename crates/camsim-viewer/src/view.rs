@@ -102,7 +102,7 @@ pub struct View {
     pub wipe: f32,
     /// Screen pixels (not points) per camera pixel; `None` fits the picture into the pane.
     pub zoom: Option<f32>,
-    /// Camera position in the centre of the pane, as a share of the picture's size; ignored for a fitted
+    /// Camera position in the centre of the pane, as a fraction of the picture's size; ignored for a fitted
     /// picture.
     pub centre: [f32; 2],
     /// Overlays.

@@ -103,7 +103,7 @@ fn surface_inverse_depth(position_px: vec2<f32>) -> f32 {
     return inverse_depth(position_px);
 }
 
-// Subsample `i` of `frame.edge_samples`: position in the pixel, -0.5 to 0.5 (Hammersley points), and share of
+// Subsample `i` of `frame.edge_samples`: position in the pixel, -0.5 to 0.5 (Hammersley points), and fraction of
 // the exposure that has passed.
 fn subsample(i: u32) -> vec3<f32> {
     let step = 1.0 / f32(frame.edge_samples);
@@ -112,12 +112,12 @@ fn subsample(i: u32) -> vec3<f32> {
     return vec3<f32>(x - 0.5, y - 0.5, fract(GOLDEN * (f32(i) + 0.5)));
 }
 
-// Pose relative to the selected key at a share of the exposure; nodes are equally spaced in time.
-fn pose_at_share(pixel: vec2<u32>, share: f32) -> Pose {
-    if (share == 0.5) {
+// Pose relative to the selected key at a fraction of the exposure; nodes are equally spaced in time.
+fn pose_at_fraction(pixel: vec2<u32>, fraction: f32) -> Pose {
+    if (fraction == 0.5) {
         return table_mid_pose(pixel);
     }
-    let node_position = share * f32(frame.nodes - 1u);
+    let node_position = fraction * f32(frame.nodes - 1u);
     let node = min(u32(node_position), max(frame.nodes, 2u) - 2u);
     let pose = table_pose(pixel, node);
     if (unspecialised(frame.nodes) > 1u) {
@@ -133,7 +133,7 @@ fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
     // Instants as in candidates.wgsl.
     let instants = select(1u, 3u, unspecialised(frame.nodes) > 1u);
     for (var i = 0u; i < instants; i++) {
-        let pose = pose_at_share(pixel, select(0.5, 0.5 * f32(i), instants > 1u));
+        let pose = pose_at_fraction(pixel, select(0.5, 0.5 * f32(i), instants > 1u));
         if (is_near_silhouette(ray.uv, pose)) {
             for (var k = 0; k < 4; k++) {
                 let uv = ray.uv + (f32(k & 1) - 0.5) * ray.d_dx + (f32(k >> 1u) - 0.5) * ray.d_dy;
@@ -164,9 +164,9 @@ fn rays_color(pixel: vec2<u32>, ray: Ray) -> vec3<f32> {
 }
 
 // Point that the centre of a pixel sees: the hit of its central ray, in the key that shows it.
-fn centre_hit(pixel: vec2<u32>, ray: Ray, share: f32) -> CentrePoint {
-    let hit = first_surface_of_keys(pixel, ray.uv, share);
-    let pose = pose_at_share(pixel, share);
+fn centre_hit(pixel: vec2<u32>, ray: Ray, fraction: f32) -> CentrePoint {
+    let hit = first_surface_of_keys(pixel, ray.uv, fraction);
+    let pose = pose_at_fraction(pixel, fraction);
     let w = interpolated_depth(ray.uv, pose, hit.line_inverse_depth);
     let point_in_key = point_at(ray.uv, pose, w);
     return centre_point(ideal_px_from_point(point_in_key), w, w / point_in_key.z);
@@ -174,7 +174,7 @@ fn centre_hit(pixel: vec2<u32>, ray: Ray, share: f32) -> CentrePoint {
 
 fn silhouette_source_px(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
     select_key_of_line(pixel);
-    if (!is_near_silhouette(ray.uv, pose_at_share(pixel, phase + 0.5))) {
+    if (!is_near_silhouette(ray.uv, pose_at_fraction(pixel, phase + 0.5))) {
         return smooth_source_px(pixel, ray, phase);
     }
     return centre_hit(pixel, ray, phase + 0.5).reference_px;
@@ -201,7 +201,7 @@ fn emit_centre_truth(pixel: vec2<u32>, ray: Ray) {
         );
     } else if (
         is_near_silhouette(ray.uv, table_mid_pose(pixel))
-        || is_near_silhouette(ray.uv, pose_at_share(pixel, coords_phase() + 0.5))
+        || is_near_silhouette(ray.uv, pose_at_fraction(pixel, coords_phase() + 0.5))
     ) {
         emit_truth(pixel, unknown_truth(ray));
     }
@@ -219,20 +219,20 @@ struct SurfaceHit {
 
 // First intersection in the nearest key in time, or else in the next one that shows it. That key stays
 // selected.
-fn first_surface_of_keys(pixel: vec2<u32>, uv: vec2<f32>, share: f32) -> SurfaceHit {
-    select_key_of_rank(pixel, share, 0u);
-    let first = first_surface(uv, pose_at_share(pixel, share));
+fn first_surface_of_keys(pixel: vec2<u32>, uv: vec2<f32>, fraction: f32) -> SurfaceHit {
+    select_key_of_rank(pixel, fraction, 0u);
+    let first = first_surface(uv, pose_at_fraction(pixel, fraction));
     if (first.is_visible) {
         return first;
     }
     for (var rank = 1u; rank < key_count(); rank++) {
-        select_key_of_rank(pixel, share, rank);
-        let hit = first_surface(uv, pose_at_share(pixel, share));
+        select_key_of_rank(pixel, fraction, rank);
+        let hit = first_surface(uv, pose_at_fraction(pixel, fraction));
         if (hit.is_visible) {
             return hit;
         }
     }
-    select_key_of_rank(pixel, share, 0u);
+    select_key_of_rank(pixel, fraction, 0u);
     return first;
 }
 

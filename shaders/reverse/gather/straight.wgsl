@@ -16,7 +16,7 @@ fn exposure_ends(pixel: vec2<u32>, ray: Ray) -> Ends {
 }
 
 // Position of sample i along the segment, 0 to 1.
-fn sample_share(i: u32) -> f32 {
+fn sample_fraction(i: u32) -> f32 {
     return select(f32(i) / f32(max(frame.max_samples, 2u) - 1u), 0.5, frame.max_samples < 2u);
 }
 
@@ -31,7 +31,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let samples = unspecialised(frame.max_samples);
     for (var i = 0u; i < samples; i++) {
         sum += textureSampleLevel(
-            ideal_color, ideal_sampler, mix(first_uv, last_uv, sample_share(i)), 0.0
+            ideal_color, ideal_sampler, mix(first_uv, last_uv, sample_fraction(i)), 0.0
         ).rgb;
     }
     return Gathered(

@@ -8,22 +8,22 @@ fn key_count() -> u32 {
     return unspecialised(frame.keys);
 }
 
-// Mid-exposure of the pixel's line and its exposure time, as shares of the window.
-fn window_shares(pixel: vec2<u32>) -> vec2<f32> {
+// Mid-exposure of the pixel's line and its exposure time, as fractions of the window.
+fn window_fractions(pixel: vec2<u32>) -> vec2<f32> {
     let line = select(pixel.y, pixel.x, frame.line_axis == 1u);
     let field = select(0u, pixel.y & 1u, frame.fields == 2u);
     let stride = select(frame.nodes + 1u, 1u, frame.nodes == 1u);
     return poses[frame.keys * (frame.fields * frame.lines * stride + 1u) + field * frame.lines + line].x.xy;
 }
 
-// The nearest key is that of the part of the window that contains the share; the others follow by their
+// The nearest key is that of the part of the window that contains the fraction; the others follow by their
 // distance.
-fn select_rank(share: f32, rank: u32) {
+fn select_rank(fraction: f32, rank: u32) {
     var used_keys = 0u;
     for (var i = 0u; i <= rank; i++) {
         var least_distance = 1e30;
         for (var key = 0u; key < key_count(); key++) {
-            let distance = abs(share * f32(frame.keys) - f32(key) - 0.5);
+            let distance = abs(fraction * f32(frame.keys) - f32(key) - 0.5);
             if (distance < least_distance && (used_keys & (1u << key)) == 0u) {
                 least_distance = distance;
                 selected_key = key;
@@ -34,12 +34,12 @@ fn select_rank(share: f32, rank: u32) {
 }
 
 fn select_key_of_line(pixel: vec2<u32>) {
-    select_rank(window_shares(pixel).x, 0u);
+    select_rank(window_fractions(pixel).x, 0u);
 }
 
-fn select_key_of_rank(pixel: vec2<u32>, exposure_share: f32, rank: u32) {
-    let shares = window_shares(pixel);
-    select_rank(shares.x + (exposure_share - 0.5) * shares.y, rank);
+fn select_key_of_rank(pixel: vec2<u32>, exposure_fraction: f32, rank: u32) {
+    let fractions = window_fractions(pixel);
+    select_rank(fractions.x + (exposure_fraction - 0.5) * fractions.y, rank);
 }
 
 fn key_index() -> u32 {

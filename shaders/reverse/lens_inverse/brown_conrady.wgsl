@@ -1,7 +1,7 @@
 // Brown-Conrady model, polynomial or rational, with tangential terms (paper eqs. 8 and 9). Twin:
 // lens/brown_conrady.rs.
 
-// Initial values are limited to this share of the fold radius, where the Jacobian is safely regular.
+// Initial values are limited to this fraction of the fold radius, where the Jacobian is safely regular.
 const START_SHARE_OF_FOLD: f32 = 0.95;
 const MIN_DETERMINANT: f32 = 1e-4;
 

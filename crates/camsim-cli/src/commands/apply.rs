@@ -281,7 +281,7 @@ fn warn_no_source(no_source: &NoSourceCounts, pixels: f64, console: &mut Console
 
 /// Warns if a flow is extrapolated far beyond its interval.
 fn warn_of_extrapolation(args: &ApplyArgs, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
-    let Some([first, last]) = pipeline.flow_shares() else { return };
+    let Some([first, last]) = pipeline.flow_fractions() else { return };
     let reach = format!(
         "the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the ideal image"
     );

@@ -62,7 +62,7 @@ enum LensCommand {
         #[arg(short, long, value_name = "CSV")]
         output: Option<PathBuf>,
     },
-    /// Show where the model folds, the share of the image with an inverse, and the largest round-trip error
+    /// Show where the model folds, the fraction of the image with an inverse, and the largest round-trip error
     Check {
         /// Print JSON
         #[arg(long)]

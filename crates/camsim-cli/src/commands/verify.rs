@@ -35,7 +35,7 @@ use lines::{channel_lines, describe_truth};
 /// and with --pictures if the picture error is above quality.max_error_dn. If fewer than one pixel in twenty
 /// is away from silhouettes, the 99th percentile is that of all pixels. If more than one in a hundred is
 /// missing or falsely valid, or none can be compared, there is no percentile and the tolerance is exceeded. A
-/// second line shows the disoccluded share of the picture, predicted and measured.
+/// second line shows the disoccluded fraction of the picture, predicted and measured.
 ///
 /// The terrain is drawn at a level of detail within quality.max_terrain_error_px. The bound has its own
 /// column, because the source errors contain only its effect on parallax. Its effect on the picture is part
@@ -179,13 +179,13 @@ const HEADER: &str = concat!(
 
 fn print(verified: &FrameReport, tolerance_dn: f64, console: &mut Console<'_>) -> Result<(), Failure> {
     let FrameReport { frame, predicted, measured, .. } = verified;
-    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, disocclusion_share } =
+    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, disocclusion_fraction } =
         measured;
     let terrain_off = verified
         .level_of_detail
         .as_ref()
         .map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
-    let share = 100.0 * silhouettes.count as f64 / all.count.max(1) as f64;
+    let fraction = 100.0 * silhouettes.count as f64 / all.count.max(1) as f64;
     let why = match judged_by {
         JudgedBy::All => {
             format!(": hardly any pixel is away from silhouettes, {:.2e} px over all", all.p99_px)
@@ -194,7 +194,7 @@ fn print(verified: &FrameReport, tolerance_dn: f64, console: &mut Console<'_>) -
         JudgedBy::Smooth => String::new(),
     };
     console.line(format_args!(
-        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | \
+        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {fraction:>12.1} % {:>10.2e} {:>10.2e} | \
          {falsely_valid:>13} {missing:>8} | {terrain_off:>14} | {}{why}",
         predicted.total_px,
         smooth.p99_px,
@@ -211,11 +211,11 @@ fn print(verified: &FrameReport, tolerance_dn: f64, console: &mut Console<'_>) -
     let blended_dn = blended_depth.map_or(0.0, |blended| blended.error_dn);
     let expected = disocclusion.map_or_else(
         || "not predicted".to_owned(),
-        |disocclusion| format!("predicted {:.4} %", 100.0 * disocclusion.share),
+        |disocclusion| format!("predicted {:.4} %", 100.0 * disocclusion.fraction),
     );
     console.line(format_args!(
         "       | disoccluded: {expected}, measured {:.4} % of the picture",
-        100.0 * disocclusion_share
+        100.0 * disocclusion_fraction
     ))?;
     for line in verified.truth.iter().map(describe_truth).chain(channel_lines(verified)) {
         console.line(format_args!("       | {line}"))?;

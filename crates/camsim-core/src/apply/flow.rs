@@ -1,7 +1,7 @@
 //! Optical flow instead of camera motion, for scenes with moving objects.
 //!
 //! Each pixel of the ideal frame has a displacement f over an interval T, in ideal pixels, by the motion of
-//! camera and objects together. In between, motion is assumed uniform and straight: after the share `tau = dt
+//! camera and objects together. In between, motion is assumed uniform and straight: after the fraction `tau = dt
 //! / T` of the interval, the content of pixel s is at `s + tau f(s)`. The source of a ray at position p is
 //! the s with `s + tau f(s) = p`, and the nearest if there are several. For an accelerated image motion the
 //! error is at most `|f''| |dt (T - dt)| / 2` (f'' in px/s^2, any dt), so flow over a short interval is more
@@ -65,12 +65,12 @@ impl FlowSearch {
         Self { grid, blocks }
     }
 
-    /// Source of `position_px` after the share `share` of the interval. `holes` marks pixels with unknown
+    /// Source of `position_px` after the fraction `fraction` of the interval. `holes` marks pixels with unknown
     /// depth; empty means none.
     pub(super) fn source(
         &self,
         position_px: DVec2,
-        share: f64,
+        fraction: f64,
         depth: &InverseDepthImage<'_>,
         holes: &[bool],
         ideal: &IdealGeometry,
@@ -82,11 +82,11 @@ impl FlowSearch {
         let mut behind: Option<(Rank, DVec2)> = None;
         let mut left = MAX_BOXES;
         let _ = self.blocks.visit(
-            &FlowQuery { grid: &self.grid, position_px, shares: &[share], reach_px: 0.0 },
+            &FlowQuery { grid: &self.grid, position_px, fractions: &[fraction], reach_px: 0.0 },
             &mut left,
             &mut |[column, row], _| {
                 let cell = self.grid.cell(column, row);
-                cell.sources(position_px, share, |source_px, is_front| {
+                cell.sources(position_px, fraction, |source_px, is_front| {
                     let rank = self.rank(source_px, is_front, depth);
                     if ideal.contains(source_px) && best.is_none_or(|known| rank > known.0) {
                         best = Some((rank, source_px));
@@ -94,7 +94,7 @@ impl FlowSearch {
                 });
                 if best.is_none() {
                     let rank = |corner_px| self.rank(corner_px, true, depth);
-                    cell.fallback_sources(position_px, share, rank, |rank, source_px| {
+                    cell.fallback_sources(position_px, fraction, rank, |rank, source_px| {
                         if ideal.contains(source_px) && behind.is_none_or(|known| rank < known.0) {
                             behind = Some((rank, source_px));
                         }
@@ -127,24 +127,25 @@ impl FlowSearch {
     }
 
     /// Change of the source with the position of the ray: the inverse of `1 + tau df/ds`.
-    pub(super) fn source_from_ray(&self, source_px: DVec2, share: f64) -> DMat2 {
+    pub(super) fn source_from_ray(&self, source_px: DVec2, fraction: f64) -> DMat2 {
         let (cell, within) = self.grid.cell_at(source_px);
-        let forward = DMat2::IDENTITY + cell.slope(within, share) * share;
+        let forward = DMat2::IDENTITY + cell.slope(within, fraction) * fraction;
         if forward.determinant().abs() > 1e-3 { forward.inverse() } else { DMat2::IDENTITY }
     }
 
     /// Whether the source at a position may jump within an exposure: a motion boundary with a jump of more
     /// than `most_px`, or a fold of the sheet, reaches the position.
-    pub(super) fn may_separate(&self, position_px: DVec2, shares: [f64; 2], most_px: f64) -> bool {
-        let exposure = (shares[1] - shares[0]).abs();
-        let reach = shares[0].abs().max(shares[1].abs());
+    pub(super) fn may_separate(&self, position_px: DVec2, fractions: [f64; 2], most_px: f64) -> bool {
+        let exposure = (fractions[1] - fractions[0]).abs();
+        let reach = fractions[0].abs().max(fractions[1].abs());
         let mut left = MAX_BOXES;
-        let query = FlowQuery { grid: &self.grid, position_px, shares: &shares, reach_px: REACH_PX };
+        let query = FlowQuery { grid: &self.grid, position_px, fractions: &fractions, reach_px: REACH_PX };
         let visited = self.blocks.visit(&query, &mut left, &mut |[column, row], within| {
             let may_tear = f64::from(within.tear) * exposure > most_px;
             // The rows of a matrix with a singular sum with the identity add up to 1 or more.
             let may_fold = 2.0 * f64::from(within.steep) * reach >= 1.0;
-            if may_tear || (may_fold && shares.iter().any(|share| self.grid.cell(column, row).folds(*share)))
+            if may_tear
+                || (may_fold && fractions.iter().any(|fraction| self.grid.cell(column, row).folds(*fraction)))
             {
                 return ControlFlow::Break(());
             }

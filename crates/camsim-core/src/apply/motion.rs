@@ -217,9 +217,9 @@ impl PoseTrack {
 
     fn pose(&self, dt_s: f64) -> (DVec3, DQuat) {
         let (a, b) = self.bracket(dt_s);
-        let share = (dt_s - a.t_s) / (b.t_s - a.t_s);
+        let fraction = (dt_s - a.t_s) / (b.t_s - a.t_s);
         let turn = log(a.world_from_camera.inverse() * b.world_from_camera);
-        (a.position_m.lerp(b.position_m, share), a.world_from_camera * exp(turn * share))
+        (a.position_m.lerp(b.position_m, fraction), a.world_from_camera * exp(turn * fraction))
     }
 
     fn twist_at(&self, dt_s: f64) -> Twist {

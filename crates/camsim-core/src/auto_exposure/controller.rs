@@ -3,7 +3,7 @@
 use crate::exposure::FrameExposure;
 use crate::scenario::{AutoExposureSpec, ExposureOrder};
 
-/// Level below which a picture counts as that dark, as a share of the target.
+/// Level below which a picture counts as that dark, as a fraction of the target.
 const DARKEST: f64 = 1e-3;
 /// Steps that find the exposure at which the first picture has the target's level.
 const SETTLING_STEPS: u32 = 64;
@@ -12,7 +12,7 @@ const SETTLING_STEPS: u32 = 64;
 /// to the nominal time.
 ///
 /// A picture that was taken with x' and has the level L shows that `x' + ln(target / L)` would be right, unless
-/// it is saturated. Each frame corrects the share `speed` of the difference: x moves towards what is right
+/// it is saturated. Each frame corrects the fraction `speed` of the difference: x moves towards what is right
 /// without overshoot, whatever the delay, as the exposure of the metered picture is known.
 #[derive(Clone, Debug)]
 pub struct Controller {

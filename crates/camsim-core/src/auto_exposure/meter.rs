@@ -64,7 +64,7 @@ struct MeterPoint {
     pixel: [u32; 2],
     /// Weight in the mean.
     weight: f64,
-    /// Share of the light that the vignette leaves.
+    /// Fraction of the light that the vignette leaves.
     vignette: f64,
 }
 
@@ -85,11 +85,11 @@ impl MeteredLight {
         if weights > 0.0 { sum / weights } else { 0.0 }
     }
 
-    fn add(&mut self, color: DVec3, point: &MeterPoint, share: f64) {
+    fn add(&mut self, color: DVec3, point: &MeterPoint, fraction: f64) {
         let light = point.vignette * DVec3::from_array(LUMINANCE_F64).dot(color);
         // What is no number is dark.
         let light = if light.is_finite() { light.max(0.0) } else { 0.0 };
-        self.places.push([light, point.weight * share].map(|value| value as f32));
+        self.places.push([light, point.weight * fraction].map(|value| value as f32));
     }
 }
 
@@ -213,10 +213,10 @@ fn points(sequence: &Sequence, spec: &AutoExposureSpec) -> Vec<MeterPoint> {
     cells
         .map(|[column, row]| {
             let in_cell = DVec2::new(spread(row), spread(column)) + 0.5;
-            let share =
+            let fraction =
                 (DVec2::new(column as f64, row as f64) + in_cell) / DVec2::new(COLUMNS as f64, ROWS as f64);
-            let from_middle = (share - 0.5) / 0.25;
-            let in_picture = DVec2::new(left, top) + share * DVec2::new(right - left, bottom - top);
+            let from_middle = (fraction - 0.5) / 0.25;
+            let in_picture = DVec2::new(left, top) + fraction * DVec2::new(right - left, bottom - top);
             let position_px = in_picture * DVec2::new(f64::from(width), f64::from(height)) - 0.5;
             let [x, y] = position_px.round().to_array().map(|px| px.max(0.0) as u32);
             let pixel = [x.min(width.saturating_sub(1)), y.min(height.saturating_sub(1))];

@@ -38,7 +38,7 @@ pub struct ExposureTrack {
     sequence: Arc<Sequence>,
     spec: AutoExposureSpec,
     controller: Controller,
-    /// Level of white at the nominal exposure, and of the full well at gain 1: shares of the largest value.
+    /// Level of white at the nominal exposure, and of the full well at gain 1: fractions of the largest value.
     white: f64,
     full_well: f64,
     /// Checked parts of the meter, which is made when it is needed first.
@@ -81,7 +81,7 @@ impl ExposureTrack {
         }))
     }
 
-    /// Level that the meter finds in the picture of a frame, with the exposure that it has: a share of the
+    /// Level that the meter finds in the picture of a frame, with the exposure that it has: a fraction of the
     /// largest value. `camera.auto_exposure.target` is what it should be.
     #[must_use]
     pub fn level(&self, frame: u64) -> f64 {

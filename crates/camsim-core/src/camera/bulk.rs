@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::{CameraModel, image_corners};
 use crate::lens::{BLOCK, Block, Bulk};
 
-/// How far beside the picture points are still fast, as a share of its size.
+/// How far beside the picture points are still fast, as a fraction of its size.
 const BESIDE: f64 = 0.05;
 
 /// So few pixels are solved sooner one by one: less than twice the nodes of a grid of starts.

@@ -18,9 +18,9 @@ const BIJECTIVITY_GRID: u32 = 33;
 /// Report of [`CameraModel::check`] (`camsim lens CAMERA.toml check --json`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LensCheck {
-    /// Share of the pixels that have an ideal ray, within what an ideal plane holds.
+    /// Fraction of the pixels that have an ideal ray, within what an ideal plane holds.
     pub valid_fraction: f64,
-    /// Share of the pixels that have a ray at any angle.
+    /// Fraction of the pixels that have a ray at any angle.
     pub ray_fraction: f64,
     /// Largest angle off axis of such a ray, degrees.
     pub angle_max_deg: f64,

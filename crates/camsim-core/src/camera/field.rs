@@ -23,8 +23,8 @@ impl CameraModel {
     /// the axis.
     fn signed_angle(&self, middle: DVec2, reach: DVec2) -> f64 {
         let ray = (0..=STEPS).find_map(|step| {
-            let share = 1.0 - f64::from(step) / f64::from(STEPS);
-            self.ray(middle + share * reach)
+            let fraction = 1.0 - f64::from(step) / f64::from(STEPS);
+            self.ray(middle + fraction * reach)
         });
         ray.map_or(0.0, |ray| {
             let off_axis = ray.truncate().length().atan2(ray.z);

@@ -48,9 +48,9 @@ impl ZoomTable {
         let above = self.entries.partition_point(|entry| entry.at <= zoom);
         let low = &self.entries[above.saturating_sub(1)];
         let high = &self.entries[above.min(self.entries.len() - 1)];
-        let share =
+        let fraction =
             if high.at > low.at { ((zoom - low.at) / (high.at - low.at)).clamp(0.0, 1.0) } else { 0.0 };
-        let mix = |a: f64, b: f64| a + (b - a) * share;
+        let mix = |a: f64, b: f64| a + (b - a) * fraction;
         let principal_point_px = match (low.principal_point_px, high.principal_point_px) {
             (None, None) => None,
             (a, b) => {

@@ -75,23 +75,23 @@ fn names_indices_and_seeds_are_uncorrelated() {
 }
 
 #[test]
-fn integers_and_choices_come_up_by_their_shares() {
+fn integers_and_choices_come_up_by_their_fractions() {
     let draws = Draws::new(3, "n");
     let dice = Distribution::Integer { low: -1, high: 4 };
     let mut counts = [0_u32; 6];
-    let shares = [0.5, 0.0, 1.5, 2.0];
+    let fractions = [0.5, 0.0, 1.5, 2.0];
     let mut chosen = [0_u32; 4];
     for k in 0..COUNT {
         counts[(dice.quantile(draws.unit(k)) + 1.0) as usize] += 1;
-        chosen[choose(&shares, draws.unit(k))] += 1;
+        chosen[choose(&fractions, draws.unit(k))] += 1;
     }
     // Chi-squared of 5 degrees of freedom: above 35 once in a million.
     let expected = COUNT as f64 / 6.0;
     let chi2: f64 = counts.iter().map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
     assert!(chi2 < 35.0, "{counts:?}");
     assert_eq!(chosen[1], 0);
-    for (n, share) in chosen.iter().zip(shares) {
-        let p = share / 4.0;
+    for (n, fraction) in chosen.iter().zip(fractions) {
+        let p = fraction / 4.0;
         let tolerance = 5.0 * (COUNT as f64 * p * (1.0 - p)).sqrt();
         assert!((f64::from(*n) - COUNT as f64 * p).abs() <= tolerance, "{chosen:?}");
     }

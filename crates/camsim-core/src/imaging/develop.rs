@@ -23,7 +23,7 @@ pub(super) struct Development {
     gains: [f32; 4],
     /// `None` where colours stay as they are.
     matrix: Option<Mat3>,
-    share_of_code: Vec<f32>,
+    fraction_of_code: Vec<f32>,
     response: Response,
 }
 
@@ -57,13 +57,13 @@ impl Development {
             None => (Mat3::from_diagonal(white.recip()) * seen).inverse(),
         };
         let is_unit = matrix == Mat3::IDENTITY || spec.mosaic == Mosaic::Mono;
-        let largest = settings.largest_share as f32;
+        let largest = settings.largest_fraction as f32;
         Self {
             mosaic: spec.mosaic,
             method: spec.demosaic,
             gains: gains.map(|gain| gain as f32 / largest),
             matrix: (!is_unit).then_some(matrix),
-            share_of_code: settings.share_of_code.clone(),
+            fraction_of_code: settings.fraction_of_code.clone(),
             response: match spec.response {
                 ResponseCurve::Linear => Response::Linear,
                 ResponseCurve::Srgb => Response::Srgb,
@@ -76,13 +76,13 @@ impl Development {
     /// Colours of the pixels with a ray; the others stay as they are.
     pub fn develop(&self, raw: &RawPicture, size_px: [u32; 2], color_rgba: &mut [f32]) {
         let width = size_px[0] as usize;
-        let share = |code: u16| self.share_of_code[code as usize];
+        let fraction = |code: u16| self.fraction_of_code[code as usize];
         match self.mosaic {
             Mosaic::None => {
                 let rows = raw.values.par_chunks(3 * width).zip(color_rgba.par_chunks_mut(4 * width));
                 rows.for_each(|(codes, rgba)| {
                     for (code, rgba) in codes.chunks_exact(3).zip(rgba.chunks_exact_mut(4)) {
-                        self.finish([0, 1, 2].map(|k: usize| self.gains[k] * share(code[k])), rgba);
+                        self.finish([0, 1, 2].map(|k: usize| self.gains[k] * fraction(code[k])), rgba);
                     }
                 });
             }
@@ -90,14 +90,14 @@ impl Development {
                 let rows = raw.values.par_chunks(width).zip(color_rgba.par_chunks_mut(4 * width));
                 rows.for_each(|(codes, rgba)| {
                     for (code, rgba) in codes.iter().zip(rgba.chunks_exact_mut(4)) {
-                        self.finish([self.gains[3] * share(*code); 3], rgba);
+                        self.finish([self.gains[3] * fraction(*code); 3], rgba);
                     }
                 });
             }
             mosaic => {
                 let value = |x: usize, y: usize| {
                     let gain = self.gains[color_at(mosaic, [x as u32, y as u32]) as usize];
-                    gain * share(raw.values[y * width + x])
+                    gain * fraction(raw.values[y * width + x])
                 };
                 let values = Mosaicked::new(mosaic, size_px, value);
                 let memory = || (Candidates::new(width), vec![[0.0; 3]; width]);

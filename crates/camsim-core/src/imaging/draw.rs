@@ -2,7 +2,7 @@
 //! and square roots alone, so that they are the same on every machine.
 //!
 //! Both distributions are drawn by inversion, which is monotonic: where two renderers differ by d electrons of
-//! light, their pictures differ by one electron in a share d of the pixels.
+//! light, their pictures differ by one electron in a fraction d of the pixels.
 
 use crate::noise::{pcg4d, upper_quantile};
 
@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// The quantile is increasing, so the cumulative probability of k is the share of bits that give at most k.
+    /// The quantile is increasing, so the cumulative probability of k is the fraction of bits that give at most k.
     fn worst_probability(draws: &Draws, mean: f32) -> f64 {
         let spread = 12.0 * f64::from(mean).sqrt() + 12.0;
         let first = (f64::from(mean) - spread).max(0.0) as usize;

@@ -45,7 +45,7 @@ impl Exposed {
     }
 }
 
-/// Level of the scene's white with the nominal exposure, and of the full well, which may be infinite: shares of
+/// Level of the scene's white with the nominal exposure, and of the full well, which may be infinite: fractions of
 /// the range of digital numbers above black.
 pub(crate) fn sensor_range(spec: &ImageSensorSpec, nominal_s: f64) -> [f64; 2] {
     let settings = Settings::new(&with_facts(spec), nominal_s);

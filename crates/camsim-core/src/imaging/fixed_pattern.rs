@@ -107,6 +107,6 @@ fn defects(
     (hot, dead)
 }
 
-fn is_below(bits: u32, share: f64) -> bool {
-    (f64::from(bits) + 0.5) / 4_294_967_296.0 < share
+fn is_below(bits: u32, fraction: f64) -> bool {
+    (f64::from(bits) + 0.5) / 4_294_967_296.0 < fraction
 }

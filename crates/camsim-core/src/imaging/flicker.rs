@@ -86,9 +86,10 @@ mod tests {
                 let flicker = flicker(wave, exposure_ms);
                 for mid_s in [-0.013, 0.0, 0.0021, 0.0077, 31.4159] {
                     const STEPS: u32 = 200_000;
-                    let share = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS) - 0.5;
-                    let sum: f64 =
-                        (0..STEPS).map(|i| lamp(&flicker.spec, mid_s + share(i) * exposure_ms * 1e-3)).sum();
+                    let fraction = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS) - 0.5;
+                    let sum: f64 = (0..STEPS)
+                        .map(|i| lamp(&flicker.spec, mid_s + fraction(i) * exposure_ms * 1e-3))
+                        .sum();
                     let expected = sum / f64::from(STEPS);
                     let found = flicker.mean(mid_s, exposure_ms * 1e-3);
                     assert!(

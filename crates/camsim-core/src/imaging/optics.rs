@@ -192,8 +192,8 @@ impl SimpleModel {
     }
 }
 
-/// `(1 - share) L + share mean(L)`, with the mean over the pixels that have a ray, of each channel.
-fn add_glare(share: f64, width: usize, color_rgba: &mut [f32]) {
+/// `(1 - fraction) L + fraction mean(L)`, with the mean over the pixels that have a ray, of each channel.
+fn add_glare(fraction: f64, width: usize, color_rgba: &mut [f32]) {
     // Sums of rows, so that the result does not depend on the number of threads.
     let sums: Vec<[f64; RGBA]> = color_rgba
         .par_chunks(RGBA * width)
@@ -207,8 +207,8 @@ fn add_glare(share: f64, width: usize, color_rgba: &mut [f32]) {
     if sum[3] == 0.0 {
         return;
     }
-    let veil = [0, 1, 2].map(|k: usize| (share * sum[k] / sum[3]) as f32);
-    let left = (1.0 - share) as f32;
+    let veil = [0, 1, 2].map(|k: usize| (fraction * sum[k] / sum[3]) as f32);
+    let left = (1.0 - fraction) as f32;
     color_rgba.par_chunks_exact_mut(RGBA).filter(|rgba| rgba[3] > 0.0).for_each(|rgba| {
         rgba.iter_mut().zip(veil).for_each(|(value, veil)| *value = left * *value + veil);
     });

@@ -31,10 +31,10 @@ pub(super) struct Settings {
     pub full_well_e: f32,
     pub bits: u32,
     pub black_code: u16,
-    /// Share of the converter's range above black that each code stands for.
-    pub share_of_code: Vec<f32>,
-    /// Largest share above black; where the full well or the largest number ends the range.
-    pub largest_share: f64,
+    /// Fraction of the converter's range above black that each code stands for.
+    pub fraction_of_code: Vec<f32>,
+    /// Largest fraction above black; where the full well or the largest number ends the range.
+    pub largest_fraction: f64,
     /// Fixed pattern, electrons and shares.
     pub prnu: f32,
     pub dsnu_e: f32,
@@ -81,8 +81,8 @@ impl Settings {
             full_well_e: full_well_e as f32,
             bits,
             black_code: 0,
-            share_of_code: Vec::new(),
-            largest_share: (full_well_e / e_per_dn / (adc_max - spec.black_dn)).min(1.0),
+            fraction_of_code: Vec::new(),
+            largest_fraction: (full_well_e / e_per_dn / (adc_max - spec.black_dn)).min(1.0),
             prnu: spec.prnu.unwrap_or(0.0) as f32,
             dsnu_e: spec.dsnu_e.unwrap_or(0.0) as f32,
             row_offset_e: spec.row_offset_e as f32,
@@ -138,20 +138,20 @@ impl Settings {
     fn set_codes(&mut self, spec: &ImageSensorSpec) {
         let (code_max, adc_max) = (f64::from((1_u32 << self.bits) - 1), f64::from(self.adc_max));
         let curve = Curve::new(spec);
-        let share = |dn: f64| ((dn - spec.black_dn) / (adc_max - spec.black_dn)) as f32;
+        let fraction = |dn: f64| ((dn - spec.black_dn) / (adc_max - spec.black_dn)) as f32;
         if curve.points == Curve::straight() && code_max == adc_max {
-            self.share_of_code = (0..=code_max as u32).map(|dn| share(f64::from(dn))).collect();
+            self.fraction_of_code = (0..=code_max as u32).map(|dn| fraction(f64::from(dn))).collect();
         } else {
             let code = |dn: u32| (curve.at(f64::from(dn) / adc_max) * code_max).round() as u16;
             self.code_of_dn = Some((0..=adc_max as u32).map(code).collect());
-            let dn = |code: u32| share(curve.inverse(f64::from(code) / code_max) * adc_max);
-            self.share_of_code = (0..=code_max as u32).map(dn).collect();
+            let dn = |code: u32| fraction(curve.inverse(f64::from(code) / code_max) * adc_max);
+            self.fraction_of_code = (0..=code_max as u32).map(dn).collect();
         }
         self.black_code = self.code(0.0);
     }
 }
 
-/// A companding curve over shares of both ranges.
+/// A companding curve over fractions of both ranges.
 struct Curve {
     is_root: bool,
     points: Vec<[f64; 2]>,
@@ -170,12 +170,12 @@ impl Curve {
         vec![[0.0, 0.0], [1.0, 1.0]]
     }
 
-    fn at(&self, share: f64) -> f64 {
-        if self.is_root { share.sqrt() } else { between(&self.points, 0, share) }
+    fn at(&self, fraction: f64) -> f64 {
+        if self.is_root { fraction.sqrt() } else { between(&self.points, 0, fraction) }
     }
 
-    fn inverse(&self, share: f64) -> f64 {
-        if self.is_root { share * share } else { between(&self.points, 1, share) }
+    fn inverse(&self, fraction: f64) -> f64 {
+        if self.is_root { fraction * fraction } else { between(&self.points, 1, fraction) }
     }
 }
 
@@ -226,7 +226,7 @@ fn weights(spec: &ImageSensorSpec, white_e: [f64; 4]) -> [[f32; 3]; 4] {
     let rows = [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]], LUMINANCE_F64];
     let mut scaled = [[0.0; 3]; 4];
     for (scaled, (row, electrons)) in scaled.iter_mut().zip(rows.iter().zip(white_e)) {
-        *scaled = row.map(|share| (share * electrons) as f32);
+        *scaled = row.map(|fraction| (fraction * electrons) as f32);
     }
     scaled
 }
@@ -310,16 +310,16 @@ mod tests {
                 ..spec()
             };
             let settings = Settings::new(&spec, 0.0);
-            for share in [0.0_f32, 0.01, 0.05, 0.3, 0.7, 1.0] {
-                let code = settings.code(share * 8000.0);
-                let back = settings.share_of_code[code as usize];
+            for fraction in [0.0_f32, 0.01, 0.05, 0.3, 0.7, 1.0] {
+                let code = settings.code(fraction * 8000.0);
+                let back = settings.fraction_of_code[code as usize];
                 // The code's step there: 1/255 of the output, by the slope of the curve.
-                let next = settings.share_of_code.get(code as usize + 1).copied().unwrap_or(1.0);
+                let next = settings.fraction_of_code.get(code as usize + 1).copied().unwrap_or(1.0);
                 let last =
-                    settings.share_of_code.get((code as usize).wrapping_sub(1)).copied().unwrap_or(0.0);
+                    settings.fraction_of_code.get((code as usize).wrapping_sub(1)).copied().unwrap_or(0.0);
                 assert!(
-                    (back - share).abs() <= 0.51 * (next - last) + 2e-4,
-                    "{companding:?} {share}: {back}"
+                    (back - fraction).abs() <= 0.51 * (next - last) + 2e-4,
+                    "{companding:?} {fraction}: {back}"
                 );
             }
             assert_eq!(settings.code(1e9), 255);

@@ -104,7 +104,7 @@ fn patterns_are_fixed_and_noise_is_not() {
 }
 
 #[test]
-fn hot_and_dead_pixels_have_their_shares() {
+fn hot_and_dead_pixels_have_their_fractions() {
     let size_px = [500, 400];
     let spec = ImageSensorSpec {
         hot_pixels: 0.01,
@@ -119,11 +119,11 @@ fn hot_and_dead_pixels_have_their_shares() {
     };
     let sensor = ImageSensor::new(&camera(size_px, spec), 5).expect("valid");
     let raw = sensor.raw(0, 0.0, &flat(size_px, 1.0));
-    let share = |test: &dyn Fn(u16) -> bool| {
+    let fraction = |test: &dyn Fn(u16) -> bool| {
         raw.values.iter().filter(|&&v| test(v)).count() as f64 / raw.values.len() as f64
     };
-    assert!((share(&|v| v == 20) - 0.005).abs() < 8e-4);
-    assert!((share(&|v| v == 4020) - 0.985).abs() < 2e-3);
+    assert!((fraction(&|v| v == 20) - 0.005).abs() < 8e-4);
+    assert!((fraction(&|v| v == 4020) - 0.985).abs() < 2e-3);
     // 200 electrons in the mean; of an exponential distribution 1/e is beyond it.
     let hot: Vec<f64> = raw.values.iter().filter(|&&v| v > 4020).map(|&v| f64::from(v) - 4020.0).collect();
     let [mean, _] = mean_and_variance(hot.iter().copied());
@@ -182,8 +182,8 @@ fn little_more_light_changes_few_numbers_by_one() {
         a.values.iter().zip(&b.values).map(|(a, b)| i32::from(*b) - i32::from(*a)).collect();
     assert!(differences.iter().all(|d| (0..=1).contains(d)));
     // 0.1 electrons more.
-    let share = differences.iter().sum::<i32>() as f64 / differences.len() as f64;
-    assert!((share - 0.1).abs() < 0.01, "{share}");
+    let fraction = differences.iter().sum::<i32>() as f64 / differences.len() as f64;
+    assert!((fraction - 0.1).abs() < 0.01, "{fraction}");
 }
 
 #[test]

@@ -26,13 +26,13 @@ const CELLS: usize = 96;
 const SAMPLES: [usize; 2] = [240, 160];
 /// Sectors in which the reach of the branch's image is tabulated.
 const SECTORS: usize = 360;
-/// Radii of starts elsewhere, as shares of the border's, and their directions.
+/// Radii of starts elsewhere, as fractions of the border's, and their directions.
 const ELSEWHERE: (&[f64], usize) = (&[0.5, 0.97], 8);
 /// The same for a long search.
 const EVERYWHERE: (&[f64], usize) = (&[0.97, 0.5, 0.25, 0.75, 0.9, 0.99, 0.998], 48);
 /// Distance from the rim's polygon, relative beyond 1, within which the rim itself may pass on the other side.
 const BESIDE_RIM: f64 = 5e-3;
-/// Largest deviation of the rim from its polygon, as a share of a side.
+/// Largest deviation of the rim from its polygon, as a fraction of a side.
 const SAG: f64 = 0.25;
 
 /// A smooth map of the plane.
@@ -147,10 +147,12 @@ impl Branch {
             self.starts[index([x, y])]
         });
         // Where there is one for sure, it is worth a long search.
-        let (shares, directions) = if pre_images.is_some() { EVERYWHERE } else { ELSEWHERE };
+        let (fractions, directions) = if pre_images.is_some() { EVERYWHERE } else { ELSEWHERE };
         let elsewhere = (0..directions).flat_map(|k| {
             let phi = k as f64 * TAU / directions as f64;
-            shares.iter().map(move |share| DVec2::from_angle(phi) * (share * self.border.radius(phi)))
+            fractions
+                .iter()
+                .map(move |fraction| DVec2::from_angle(phi) * (fraction * self.border.radius(phi)))
         });
         [self.starts[index(cell)]].into_iter().chain(near).chain(elsewhere).find_map(newton)
     }
@@ -161,9 +163,9 @@ impl Branch {
         let mut clear = f64::INFINITY;
         for (a, b) in self.rim.iter().zip(self.rim.iter().cycle().skip(1)) {
             let (along, to_image) = (*b - *a, image - *a);
-            let share = (to_image.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
-            // The rim between two corners may pass beside the straight line by a share of its length.
-            clear = clear.min((to_image - along * share).length() - SAG * along.length());
+            let fraction = (to_image.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+            // The rim between two corners may pass beside the straight line by a fraction of its length.
+            clear = clear.min((to_image - along * fraction).length() - SAG * along.length());
             let left = along.perp_dot(to_image);
             if a.y <= image.y && b.y > image.y && left > 0.0 {
                 turns += 1;
@@ -312,8 +314,8 @@ fn starts(map: &impl ChartMap, border: &FoldCurve) -> Vec<DVec2> {
     let [directions, radii] = SAMPLES;
     for i in 0..directions * radii {
         let phi = (i / radii) as f64 * TAU / directions as f64;
-        let share = (i % radii) as f64 / (radii as f64 - 0.999);
-        let at = DVec2::from_angle(phi) * (share * border.radius(phi));
+        let fraction = (i % radii) as f64 / (radii as f64 - 0.999);
+        let at = DVec2::from_angle(phi) * (fraction * border.radius(phi));
         let image = map.value(at);
         if !image.is_finite() {
             continue;

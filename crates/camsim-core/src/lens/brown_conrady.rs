@@ -40,7 +40,7 @@ const MAX_STALLS: u32 = 5;
 /// Largest residual of a solution, in units of the focal length (relative beyond 1).
 const MAX_RESIDUAL: f64 = 1e-9;
 
-/// Starts are at most this share of the fold radius, where the Jacobian is safely regular.
+/// Starts are at most this fraction of the fold radius, where the Jacobian is safely regular.
 const START_SHARE_OF_FOLD: f64 = 0.95;
 
 /// With `r^2 = u^2 + v^2`:

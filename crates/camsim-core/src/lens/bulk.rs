@@ -24,7 +24,7 @@ use rotation_symmetric::RotationSymmetric;
 /// Points of a block.
 pub(crate) const BLOCK: usize = 64;
 
-/// Share of the smallest border within which every point is surely on the principal branch: the border is known in
+/// Fraction of the smallest border within which every point is surely on the principal branch: the border is known in
 /// some directions only.
 const SURELY_INSIDE: f64 = 0.99;
 

@@ -166,11 +166,11 @@ impl ChartMap for Angles<'_> {
     fn jacobian(&self, angles: DVec2) -> DMat2 {
         let [x, y, z] = self.0.gradient(ray_of(angles));
         let theta = angles.length();
-        let share = sinc(theta);
+        let fraction = sinc(theta);
         // d(sin t e)/da = sinc I + (cos t - sinc) e e^T, d(cos t)/da = -sin t e.
         let e = if theta > 0.0 { angles / theta } else { DVec2::X };
-        let along = (theta.cos() - share) * (x * e.x + y * e.y) - theta.sin() * z;
-        DMat2::from_cols(x * share + along * e.x, y * share + along * e.y)
+        let along = (theta.cos() - fraction) * (x * e.x + y * e.y) - theta.sin() * z;
+        DMat2::from_cols(x * fraction + along * e.x, y * fraction + along * e.y)
     }
 
     fn margin(&self, angles: DVec2) -> f64 {

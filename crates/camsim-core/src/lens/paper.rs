@@ -95,7 +95,7 @@ mod tests {
             100.0 * f64::from(missed) / f64::from(with_ray),
             percent(false_roots)
         );
-        // The shares are about 6.8 and 1.5; they depend on what counts as missed.
+        // The fractions are about 6.8 and 1.5; they depend on what counts as missed.
         assert!(
             (3.0..12.0).contains(&(100.0 * f64::from(missed) / f64::from(with_ray)))
                 && percent(false_roots) > 0.3

@@ -79,8 +79,8 @@ fn usable_radius(lens: &Lens, phi: f64) -> f64 {
 fn jacobians_agree_with_finite_differences() {
     let h = 1e-5;
     for (name, lens) in gallery() {
-        for (phi, share) in [(0.0, 0.0), (0.3, 0.2), (1.9, 0.5), (3.7, 0.8), (5.5, 0.99)] {
-            let ideal = DVec2::from_angle(phi) * (share * usable_radius(&lens, phi));
+        for (phi, fraction) in [(0.0, 0.0), (0.3, 0.2), (1.9, 0.5), (3.7, 0.8), (5.5, 0.99)] {
+            let ideal = DVec2::from_angle(phi) * (fraction * usable_radius(&lens, phi));
             let column = |step: DVec2| (lens.distort(ideal + step) - lens.distort(ideal - step)) / (2.0 * h);
             let numeric = DMat2::from_cols(column(DVec2::new(h, 0.0)), column(DVec2::new(0.0, h)));
             let analytic = lens.jacobian(ideal);
@@ -185,7 +185,7 @@ fn invalid_coefficients_are_refused() {
     }
 }
 
-/// Rays all over the principal branch: directions, and angles up to a share of the border's.
+/// Rays all over the principal branch: directions, and angles up to a fraction of the border's.
 fn rays(lens: &Lens) -> Vec<DVec3> {
     let at = |phi: f64, theta: f64| (DVec2::from_angle(phi) * theta.sin()).extend(theta.cos());
     let mut rays = Vec::new();
@@ -287,9 +287,9 @@ proptest! {
     ) {
         let [k4, k5, k6] = rational.unwrap_or_default();
         let lens = Lens::new(LensModel::BrownConrady, &[k[0], k[1], p[0], p[1], k[2], k4, k5, k6]).unwrap();
-        for (phi, share) in points {
+        for (phi, fraction) in points {
             let direction = DVec2::from_angle(phi);
-            let ideal = direction * (share * lens.fold_radius(phi).min(1.5));
+            let ideal = direction * (fraction * lens.fold_radius(phi).min(1.5));
             let distorted = lens.distort(ideal);
             let undistorted = lens.undistort(distorted);
             prop_assert!(undistorted.is_some(), "{ideal} inside the fold was not undistorted");

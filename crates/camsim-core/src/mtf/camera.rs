@@ -92,7 +92,7 @@ impl EdgePicture {
 }
 
 /// Measures the transfer function of a camera by [`slanted_edge`], beside that of its model: that of the
-/// pixel's area times that of its point spread. Glare, which takes the same share from all frequencies above
+/// pixel's area times that of its point spread. Glare, which takes the same fraction from all frequencies above
 /// 0, is in neither.
 ///
 /// # Errors

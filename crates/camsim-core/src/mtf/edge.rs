@@ -135,9 +135,9 @@ fn centroid(row: &[f64], about: f64) -> Option<f64> {
     let (mut sum, mut moment) = (0.0, 0.0);
     for (i, pair) in row.windows(3).enumerate() {
         let x = i as f64 + 1.0;
-        let share = (x - about) / half;
-        if share.abs() < 1.0 {
-            let window = 0.54 + 0.46 * (std::f64::consts::PI * share).cos();
+        let fraction = (x - about) / half;
+        if fraction.abs() < 1.0 {
+            let window = 0.54 + 0.46 * (std::f64::consts::PI * fraction).cos();
             let slope = window * (pair[2] - pair[0]);
             sum += slope;
             moment += slope * (x - about);

@@ -1,4 +1,4 @@
-//! Disocclusion: the share of a frame that its ideal frames do not show.
+//! Disocclusion: the fraction of a frame that its ideal frames do not show.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -16,9 +16,9 @@ pub struct Disocclusion {
 }
 
 impl Disocclusion {
-    /// Share of the disoccluded rays; 0 without any rays.
+    /// Fraction of the disoccluded rays; 0 without any rays.
     #[must_use]
-    pub fn share(&self) -> f64 {
+    pub fn fraction(&self) -> f64 {
         self.hidden as f64 / self.rays.max(1) as f64
     }
 }

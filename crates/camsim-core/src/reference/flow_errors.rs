@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{
     Oracle, RaySample,
-    plane_errors::{Compared, at_share, beside_offsets},
+    plane_errors::{Compared, at_fraction, beside_offsets},
     planes::{self, PlaneOracle},
 };
 use crate::{
@@ -158,7 +158,7 @@ fn errors_of(channel: Channel, of_pixels: u64, pixels: &[PixelError]) -> FlowErr
         let of = || pixels.iter().filter(move |pixel| pixel.is_away == is_away);
         let mut errors: Vec<f64> = of().filter_map(|pixel| pixel.error).collect();
         errors.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| at_share(&errors, share);
+        let at = |fraction: f64| at_fraction(&errors, fraction);
         FlowStats {
             pixels: errors.len() as u64,
             p50: at(0.5),

@@ -142,8 +142,8 @@ impl LensInverse {
     }
 
     fn start_px(&self, i: u32) -> DVec2 {
-        let share = DVec2::new(f64::from(i % STARTS), f64::from(i / STARTS)) / f64::from(STARTS - 1);
-        share * DVec2::from(self.size_px.map(f64::from)) - 0.5
+        let fraction = DVec2::new(f64::from(i % STARTS), f64::from(i / STARTS)) / f64::from(STARTS - 1);
+        fraction * DVec2::from(self.size_px.map(f64::from)) - 0.5
     }
 
     /// Plain Newton iteration, for starts near the root.
@@ -170,9 +170,9 @@ impl LensInverse {
         if let Some(found) = self.continue_from_axis(wanted) {
             return Some(found);
         }
-        let starts = (0..12).flat_map(|k| [0.5, 0.9].map(|share| (k * DIRECTIONS / 12, share)));
-        starts.into_iter().find_map(|(direction_index, share)| {
-            let start = direction(direction_index) * (share * self.border[direction_index].min(20.0));
+        let starts = (0..12).flat_map(|k| [0.5, 0.9].map(|fraction| (k * DIRECTIONS / 12, fraction)));
+        starts.into_iter().find_map(|(direction_index, fraction)| {
+            let start = direction(direction_index) * (fraction * self.border[direction_index].min(20.0));
             self.accept(self.descend(start, wanted), wanted)
         })
     }

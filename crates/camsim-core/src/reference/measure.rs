@@ -13,10 +13,10 @@ use crate::{
     silhouette::{CREASE, NEAR_PX, bends, may_step, steps},
 };
 
-/// Largest share of pixels with a ray but without a source in a frame that keeps its tolerance.
+/// Largest fraction of pixels with a ray but without a source in a frame that keeps its tolerance.
 pub const MAX_VOID_SHARE: f64 = 0.01;
 
-/// Least share of the compared pixels away from silhouettes for which their 99th percentile represents the
+/// Least fraction of the compared pixels away from silhouettes for which their 99th percentile represents the
 /// frame.
 const MIN_SMOOTH_SHARE: f64 = 0.05;
 
@@ -323,14 +323,14 @@ fn edges(oracle: &Oracle, samples: &[Option<RaySample>]) -> Vec<bool> {
         if !may_step([inverse_depth(before), here_w, inverse_depth(after)]) {
             return false;
         }
-        let towards = |other: &RaySample, share: f64| {
-            let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, share).extend(1.0);
+        let towards = |other: &RaySample, fraction: f64| {
+            let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, fraction).extend(1.0);
             oracle.cast_at(here.t_s, here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
         };
         let [a, c] = [before, after].map(|other| towards(other, 1.0));
         bends([a, here_w, c], CREASE)
-            || steps(here_w, a, |share| towards(before, share))
-            || steps(here_w, c, |share| towards(after, share))
+            || steps(here_w, a, |fraction| towards(before, fraction))
+            || steps(here_w, c, |fraction| towards(after, fraction))
     };
     (0..samples.len())
         .into_par_iter()

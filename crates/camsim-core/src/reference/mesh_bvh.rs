@@ -217,8 +217,8 @@ impl MeshBvh {
         let [of_sun, of_sky] =
             self.light.map_or([0.0, 1.0], |light| lit(&light, cover, triangle, weights, ray));
         let lit = of_sun + of_sky;
-        let sky_share = if of_sun > 0.0 { of_sky / lit } else { 1.0 };
-        Some((Hit { tint: [red, green, blue].map(|part| part * lit), sky_share, ..hit }, alpha))
+        let sky_fraction = if of_sun > 0.0 { of_sky / lit } else { 1.0 };
+        Some((Hit { tint: [red, green, blue].map(|part| part * lit), sky_fraction, ..hit }, alpha))
     }
 
     /// Whether a ray meets a surface that has depth, of either side.
@@ -255,7 +255,7 @@ fn has_alpha(mesh: &Mesh) -> bool {
 }
 
 /// Factors of the light of sun and sky reflected at a point of a triangle towards the ray's origin (Lambert):
-/// the sun by the cosine of its angle, the sky by the share of it that the surface faces.
+/// the sun by the cosine of its angle, the sky by the fraction of it that the surface faces.
 fn lit(
     light: &Light,
     cover: &MeshSurface,
@@ -303,7 +303,7 @@ pub(super) fn hit_at(ray: &Ray, t: f64, texture_uv: [f64; 2], [a, b, c]: [DVec3;
         depth_m: t,
         texture_uv,
         tint: [1.0; 3],
-        sky_share: 1.0,
+        sky_fraction: 1.0,
         normal_ned,
         surface,
     }

@@ -155,7 +155,7 @@ impl<'a> Compared<'a> {
         let pixels: Vec<PixelError> = (0..self.samples.len()).into_par_iter().filter_map(of_pixel).collect();
         let mut sorted: Vec<f64> = pixels.iter().map(|pixel| pixel.error).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| at_share(&sorted, share);
+        let at = |fraction: f64| at_fraction(&sorted, fraction);
         let number =
             |counts: &dyn Fn(&PixelError) -> bool| pixels.iter().filter(|pixel| counts(pixel)).count() as u64;
         Some(PlaneErrors {
@@ -194,10 +194,10 @@ impl<'a> Compared<'a> {
     }
 }
 
-/// The error at a share of sorted ones; 0 without any.
-pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
+/// The error at a fraction of sorted ones; 0 without any.
+pub(super) fn at_fraction(sorted: &[f64], fraction: f64) -> f64 {
     let last = sorted.len().saturating_sub(1);
-    sorted.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0)
+    sorted.get((fraction * last as f64).ceil() as usize).copied().unwrap_or(0.0)
 }
 
 /// Error of a value; infinite for what is not a number, and where one of the two is the sky.

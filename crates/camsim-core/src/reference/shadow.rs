@@ -8,8 +8,8 @@ const LIFT_M: f64 = 1e-6;
 impl Oracle {
     /// A hit with the light that it has at path time `t_s`: without the sun where that is hidden.
     pub(super) fn in_light(&self, t_s: f64, hit: Hit) -> Hit {
-        if hit.sky_share < 1.0 && self.is_in_shadow(t_s, &hit) {
-            Hit { tint: hit.tint.map(|part| part * hit.sky_share), sky_share: 1.0, ..hit }
+        if hit.sky_fraction < 1.0 && self.is_in_shadow(t_s, &hit) {
+            Hit { tint: hit.tint.map(|part| part * hit.sky_fraction), sky_fraction: 1.0, ..hit }
         } else {
             hit
         }

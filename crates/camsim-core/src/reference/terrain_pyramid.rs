@@ -178,5 +178,5 @@ fn first_in_block(terrain: &Terrain, block: [u32; 2], ray: &Ray, mut limit: f64)
         return Some(hit);
     }
     let [of_sun, of_sky] = [0, 1].map(|k: usize| between(&|vertex| terrain.light_parts[vertex][k]));
-    Some(Hit { sky_share: if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }, ..hit })
+    Some(Hit { sky_fraction: if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }, ..hit })
 }

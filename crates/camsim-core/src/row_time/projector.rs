@@ -53,8 +53,8 @@ impl ImageGain {
         const SIDE: u32 = 16;
         let last = camera.size_px.map(|side| f64::from(side) - 1.0);
         let of_place = |i: u32| {
-            let share = [i % (SIDE + 1), i / (SIDE + 1)].map(|k| f64::from(k) / f64::from(SIDE));
-            let px = DVec2::new(share[0] * last[0], share[1] * last[1]);
+            let fraction = [i % (SIDE + 1), i / (SIDE + 1)].map(|k| f64::from(k) / f64::from(SIDE));
+            let px = DVec2::new(fraction[0] * last[0], fraction[1] * last[1]);
             // The norm of all elements bounds that of a matrix.
             let norm = |columns: &[DVec2]| {
                 columns.iter().map(|column| (column * camera.focal_px).length_squared()).sum::<f64>().sqrt()
@@ -194,21 +194,21 @@ impl RowProjector<'_> {
         for _ in 0..MOST_STEPS {
             let (here, next) = (self.project(row, place, is_far)?, self.project(row + 1, place, is_far)?);
             let (miss, miss_next) = (along(&here) - row as f64, along(&next) - (row + 1) as f64);
-            let share = miss / (miss - miss_next);
+            let fraction = miss / (miss - miss_next);
             // Half a row before the first and behind the last one belongs to these.
             let low = if row == 0 { -0.5 } else { 0.0 };
             let high = if row + 1 == last { 1.5 } else { 1.0 };
-            if share >= low && share <= high {
-                let mix = |a: f64, b: f64| a + (b - a) * share;
+            if fraction >= low && fraction <= high {
+                let mix = |a: f64, b: f64| a + (b - a) * fraction;
                 let depth_m = if is_far { here.depth_m } else { mix(here.depth_m, next.depth_m) };
                 let nearest_m = depth_m - limits.travel_m;
                 let is_sure = is_far || nearest_m > 0.0 && limits.allow(1.0 / nearest_m);
                 let [from, to] = [row, row + 1].map(|row| self.rows[row].position_ned_m);
-                let seen = Projection { px: here.px.lerp(next.px, share), depth_m };
-                let t_s = field.time_s(row as f64 + share);
-                return is_sure.then(|| self.shown(t_s, from.lerp(to, share), seen)).flatten();
+                let seen = Projection { px: here.px.lerp(next.px, fraction), depth_m };
+                let t_s = field.time_s(row as f64 + fraction);
+                return is_sure.then(|| self.shown(t_s, from.lerp(to, fraction), seen)).flatten();
             }
-            let to = (row as f64 + share).clamp(0.0, (last - 1) as f64) as usize;
+            let to = (row as f64 + fraction).clamp(0.0, (last - 1) as f64) as usize;
             if to == row {
                 return None;
             }

@@ -210,8 +210,8 @@ impl<'a> Search<'a> {
                 return self.close_in([(row(low.0), below), (row(high.0), above)]);
             }
             // The secant, and the middle each third time.
-            let share = if i % 3 == 2 { 0.5 } else { below / (below - above) };
-            let node = low.0 + (share * (high.0 - low.0) as f64).round() as usize;
+            let fraction = if i % 3 == 2 { 0.5 } else { below / (below - above) };
+            let node = low.0 + (fraction * (high.0 - low.0) as f64).round() as usize;
             let node = node.clamp(low.0 + 1, high.0 - 1);
             let Some(sample) = self.sample(node) else { return };
             if (sample.miss >= 0.0) == (below >= 0.0) { low = (node, sample) } else { high = (node, sample) }
@@ -232,8 +232,8 @@ impl<'a> Search<'a> {
         let (mut below, mut above) = (low.1, high.1);
         let mut last_is_low = None;
         for _ in 0..MOST_EVALUATIONS {
-            let share = if below == above { 0.5 } else { below / (below - above) };
-            let row = low.0 + (high.0 - low.0) * share.clamp(0.0, 1.0);
+            let fraction = if below == above { 0.5 } else { below / (below - above) };
+            let row = low.0 + (high.0 - low.0) * fraction.clamp(0.0, 1.0);
             let Some((miss, t_s, pose, seen)) = self.seen_at(row) else { return };
             if miss.abs() < EXACT || high.0 - low.0 < 1e-12 {
                 if miss.abs() < JUMP {

@@ -161,10 +161,10 @@ fn a_row_has_its_instant_and_what_is_between_rows_is_linear() {
                     }
         };
         for k in 0..10 * (count - 1) {
-            let (row, share) = (k / 10, 0.1 * (k % 10) as f64);
-            let expected_s = of_row(row) + share * (of_row(row + 1) - of_row(row));
-            let off_s = (frame.fields[0].time_s(row as f64 + share) - expected_s).abs();
-            assert!(off_s < 1e-12, "{readout:?} {row} {share}: {off_s}");
+            let (row, fraction) = (k / 10, 0.1 * (k % 10) as f64);
+            let expected_s = of_row(row) + fraction * (of_row(row + 1) - of_row(row));
+            let off_s = (frame.fields[0].time_s(row as f64 + fraction) - expected_s).abs();
+            assert!(off_s < 1e-12, "{readout:?} {row} {fraction}: {off_s}");
         }
     }
 }

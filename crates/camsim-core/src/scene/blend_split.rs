@@ -242,7 +242,7 @@ struct SplitShape {
 }
 
 impl SplitShape {
-    /// Splits the edge between two vertices at a share of its length, for all triangles that have it.
+    /// Splits the edge between two vertices at a fraction of its length, for all triangles that have it.
     fn split_edge(&mut self, from: u32, to: u32, part: f64) {
         let place = |work: &Self, corner: u32| work.shape.vertices[corner as usize].position_m;
         let ends = [place(self, from), place(self, to)];

@@ -118,7 +118,7 @@ impl Board {
                     return refuse(
                         "spacing",
                         format!(
-                            "is {spacing}; give the gap between tags as a share of size_m, above 0 and up to 1"
+                            "is {spacing}; give the gap between tags as a fraction of size_m, above 0 and up to 1"
                         ),
                     );
                 }

@@ -19,7 +19,7 @@ const MAX_PAIRS: usize = 1 << 20;
 /// Distance from a plane, relative to the triangles' size, within which a corner counts as in it: adjacent
 /// panes do not cover each other.
 const IN_PLANE: f64 = 1e-9;
-/// A triangle counts as on one side of a plane if it reaches beyond it by at most this share of its reach on
+/// A triangle counts as on one side of a plane if it reaches beyond it by at most this fraction of its reach on
 /// that side: corners of split triangles are rounded.
 pub(super) const TOLERANCE: f64 = 1e-4;
 /// The same tolerance for borders that touch in the image, in units of the image plane.

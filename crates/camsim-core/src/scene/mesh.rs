@@ -158,7 +158,7 @@ impl Material {
 /// horizon.
 const REPEATED_REACH_M: f64 = 2e5;
 
-/// Growth of the cells of a repeated image: each is this share of its distance from the centre.
+/// Growth of the cells of a repeated image: each is this fraction of its distance from the centre.
 const REPEATED_GROWTH: f64 = 0.5;
 
 /// Largest number of copies of a repeated image from its centre: 32-bit numbers hold whole ones.

@@ -125,9 +125,10 @@ impl Prefilter {
     /// Positions of the taps relative to the pixel's middle, texels of the full-size picture.
     pub fn offsets(&self) -> impl Iterator<Item = DVec2> + use<> {
         let Self { sides: [long, short], taps: [along, across], .. } = *self;
-        let share = |i: u32, taps: u32| (f64::from(i) + 0.5) / f64::from(taps) - 0.5;
-        (0..across)
-            .flat_map(move |j| (0..along).map(move |i| share(i, along) * long + share(j, across) * short))
+        let fraction = |i: u32, taps: u32| (f64::from(i) + 0.5) / f64::from(taps) - 0.5;
+        (0..across).flat_map(move |j| {
+            (0..along).map(move |i| fraction(i, along) * long + fraction(j, across) * short)
+        })
     }
 
     /// Number of taps.
@@ -156,8 +157,9 @@ impl Prefilter {
             };
             axis(cycles.x) * axis(cycles.y)
         };
-        let share = self.level - below;
-        grid * ((1.0 - share) * version(below) + if share > 0.0 { share * version(below + 1.0) } else { 0.0 })
+        let fraction = self.level - below;
+        grid * ((1.0 - fraction) * version(below)
+            + if fraction > 0.0 { fraction * version(below + 1.0) } else { 0.0 })
     }
 }
 

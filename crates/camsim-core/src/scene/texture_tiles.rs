@@ -283,9 +283,9 @@ mod tests {
                 let there = level + steps as usize;
                 for k in 0..400_u32 {
                     let uv = [0, 1].map(|axis: usize| {
-                        let share = f64::from(crate::noise::pcg4d([k, tile, axis as u32, 1])[0])
+                        let fraction = f64::from(crate::noise::pcg4d([k, tile, axis as u32, 1])[0])
                             / f64::from(u32::MAX);
-                        ((f64::from(at[axis]) + share) * f64::from(TILE_TEXELS)
+                        ((f64::from(at[axis]) + fraction) * f64::from(TILE_TEXELS)
                             / f64::from(grid.sizes[level][axis]))
                         .min(1.0)
                     });

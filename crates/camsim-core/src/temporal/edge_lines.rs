@@ -120,9 +120,9 @@ fn step(line: DVec3, members: &[Member]) -> DVec3 {
     let mut matrix = DMat3::from_diagonal(DVec3::new(RIDGE, RIDGE, 1e-4));
     for (place, nearer) in members {
         let position = place.extend(-1.0);
-        let share = 1.0 / (1.0 + (-line.dot(position)).exp());
-        gradient += (share - nearer) * position;
-        let weight = share * (1.0 - share);
+        let fraction = 1.0 / (1.0 + (-line.dot(position)).exp());
+        gradient += (fraction - nearer) * position;
+        let weight = fraction * (1.0 - fraction);
         matrix +=
             DMat3::from_cols(position * position.x, position * position.y, position * position.z) * weight;
     }
@@ -142,7 +142,7 @@ mod tests {
 
     const SIDE: i64 = 13;
 
-    /// The line of the central pixel of an image of two surfaces, and the share of that pixel's samples on
+    /// The line of the central pixel of an image of two surfaces, and the fraction of that pixel's samples on
     /// the nearer one.
     fn of(nearer: &dyn Fn(DVec2) -> bool) -> (Option<EdgeLine>, f64) {
         let middle = SIDE / 2;
@@ -156,7 +156,7 @@ mod tests {
         (edge_line([middle; 2], [SIDE; 2], &depth), own)
     }
 
-    fn share(nearer: &dyn Fn(DVec2) -> bool) -> f64 {
+    fn fraction(nearer: &dyn Fn(DVec2) -> bool) -> f64 {
         const N: u32 = 48;
         let place = |i: u32| DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N) - 0.5;
         (0..N * N).filter(|&i| nearer(place(i))).count() as f64 / f64::from(N * N)
@@ -169,12 +169,12 @@ mod tests {
             let angle = f64::from(k) * 2.399_963;
             let offset = 1.3 * (f64::from(k) * 0.618_034).fract() - 0.65;
             let normal = DVec2::from_angle(angle);
-            let truth = share(&|place| normal.dot(place) > offset);
+            let truth = fraction(&|place| normal.dot(place) > offset);
             if truth <= 0.0 || truth >= 1.0 {
                 continue;
             }
             let (line, own) = of(&|place| normal.dot(place) > offset);
-            let covered = line.map_or(own, |line| share(&|place| line.normal.dot(place) > line.offset_px));
+            let covered = line.map_or(own, |line| fraction(&|place| line.normal.dot(place) > line.offset_px));
             without += u32::from(line.is_none());
             by_line += (covered - truth).powi(2);
             by_samples += (own - truth).powi(2);

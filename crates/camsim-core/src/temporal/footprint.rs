@@ -165,15 +165,15 @@ fn tap_cell([nx, ny]: [u32; 2], turn: u32) -> u32 {
     if nx >= ny { place } else { place % columns * nx + place / columns }
 }
 
-/// Offsets of the taps of a grid, in the order in which they are read, as shares of the grid's sides from its
+/// Offsets of the taps of a grid, in the order in which they are read, as fractions of the grid's sides from its
 /// centre.
 #[must_use]
 pub fn tap_offsets(taps: [u32; 2]) -> Vec<[f32; 2]> {
     let [nx, ny] = taps.map(|n| n.max(1));
-    let share = |cell: u32, of: u32| (f64::from(cell) + 0.5) as f32 / of as f32 - 0.5;
+    let fraction = |cell: u32, of: u32| (f64::from(cell) + 0.5) as f32 / of as f32 - 0.5;
     (0..nx * ny)
         .map(|turn| tap_cell([nx, ny], turn))
-        .map(|place| [share(place % nx, nx), share(place / nx, ny)])
+        .map(|place| [fraction(place % nx, nx), fraction(place / nx, ny)])
         .collect()
 }
 

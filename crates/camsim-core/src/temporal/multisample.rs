@@ -16,7 +16,7 @@ pub const SAMPLE_POSITIONS: [DVec2; 4] = [
     DVec2::new(-0.375, 0.125),
     DVec2::new(0.125, 0.375),
 ];
-/// Inverse depths that differ by no more than this share of the nearest one belong to one surface.
+/// Inverse depths that differ by no more than this fraction of the nearest one belong to one surface.
 const ONE_SURFACE: f32 = 0.02;
 
 /// Resolves the inverse depths of the four samples (0 = infinitely far) to that of the pixel's centre.

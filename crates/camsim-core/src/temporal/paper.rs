@@ -13,9 +13,10 @@ use super::ColorImage;
 /// That is the paper's choice (eq. 20 in steps).
 #[must_use]
 pub fn gather_straight(ends_px: [DVec2; 2], samples: u32, stored: &ColorImage<'_>) -> DVec3 {
-    let share = |i: u32| if samples < 2 { 0.5 } else { f64::from(i) / f64::from(samples - 1) };
+    let fraction = |i: u32| if samples < 2 { 0.5 } else { f64::from(i) / f64::from(samples - 1) };
     let count = samples.max(1);
-    (0..count).map(|i| stored.sample(ends_px[0].lerp(ends_px[1], share(i)))).sum::<DVec3>() / f64::from(count)
+    (0..count).map(|i| stored.sample(ends_px[0].lerp(ends_px[1], fraction(i)))).sum::<DVec3>()
+        / f64::from(count)
 }
 
 /// The paper's linear fog on stored values: `mix(color, sky, clamp(distance / end, 0, 1))`. Sky

@@ -19,7 +19,7 @@ const HALVINGS: u32 = 5;
 const GAP_PX: f64 = 0.1;
 
 /// Subsample `i` of `count` (a power of two): position in the pixel, -0.5 to 0.5 (Hammersley points), and
-/// share of the exposure that has passed.
+/// fraction of the exposure that has passed.
 #[must_use]
 pub fn subsample(i: u32, count: u32) -> (DVec2, f64) {
     let step = 1.0 / f64::from(count);
@@ -43,10 +43,10 @@ pub struct SupersampledKey<'a> {
 pub struct SupersampledKeys<'a> {
     /// The ideal frames in order of time.
     pub views: &'a [SupersampledKey<'a>],
-    /// Mid-exposure of the row, as a share of the window.
-    pub row_share: f64,
-    /// Exposure time, as a share of the window.
-    pub exposure_share: f64,
+    /// Mid-exposure of the row, as a fraction of the window.
+    pub row_fraction: f64,
+    /// Exposure time, as a fraction of the window.
+    pub exposure_fraction: f64,
     /// Largest inverse depth in all ideal frames, 1/m.
     pub nearest_w: f64,
 }
@@ -63,11 +63,11 @@ pub struct SurfaceHit {
     pub is_visible: bool,
 }
 
-/// Ideal frames in order of their distance in time from a share of the window: their key instants are the middles of
+/// Ideal frames in order of their distance in time from a fraction of the window: their key instants are the middles of
 /// `count` equal parts of it. Of two at equal distance the earlier one comes first.
-pub fn nearest_first(share: f64, count: usize) -> impl Iterator<Item = usize> {
+pub fn nearest_first(fraction: f64, count: usize) -> impl Iterator<Item = usize> {
     let mut used = [false; MAX_KEYS as usize];
-    let distance = move |key: usize| (share * count as f64 - key as f64 - 0.5).abs();
+    let distance = move |key: usize| (fraction * count as f64 - key as f64 - 0.5).abs();
     (0..count).map(move |_| {
         let free = (0..count).filter(|&key| !used[key]);
         let nearest = free.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or_default();
@@ -76,15 +76,15 @@ pub fn nearest_first(share: f64, count: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// First intersection of a ray at a share of the window, and the number of the ideal frame that shows it: the nearest
+/// First intersection of a ray at a fraction of the window, and the number of the ideal frame that shows it: the nearest
 /// one in time, or else the next one in which the intersection is visible. `hit` is that in one of `count` frames.
 pub fn first_visible(
-    window_share: f64,
+    window_fraction: f64,
     count: usize,
     hit: impl Fn(usize) -> Option<SurfaceHit>,
 ) -> Option<(usize, SurfaceHit)> {
     let mut first = None;
-    for key in nearest_first(window_share, count) {
+    for key in nearest_first(window_fraction, count) {
         let found = (key, hit(key)?);
         if found.1.is_visible {
             return Some(found);
@@ -94,9 +94,9 @@ pub fn first_visible(
     first
 }
 
-/// Pose at a share of the exposure, linear between nodes.
-fn pose_along(nodes: &[(DMat3, DVec3)], share: f64) -> Option<(DMat3, DVec3)> {
-    let along = share * nodes.len().saturating_sub(1) as f64;
+/// Pose at a fraction of the exposure, linear between nodes.
+fn pose_along(nodes: &[(DMat3, DVec3)], fraction: f64) -> Option<(DMat3, DVec3)> {
+    let along = fraction * nodes.len().saturating_sub(1) as f64;
     let node = (along as usize).min(nodes.len().saturating_sub(2));
     let a = *nodes.get(node)?;
     Some(nodes.get(node + 1).map_or(a, |b| {
@@ -105,18 +105,18 @@ fn pose_along(nodes: &[(DMat3, DVec3)], share: f64) -> Option<(DMat3, DVec3)> {
     }))
 }
 
-/// First intersection of a ray at a share of the exposure, as [`first_visible`].
+/// First intersection of a ray at a fraction of the exposure, as [`first_visible`].
 #[must_use]
 pub fn first_surface_of_keys(
     uv: DVec2,
-    share: f64,
+    fraction: f64,
     keys: &SupersampledKeys<'_>,
     ideal: &IdealGeometry,
 ) -> Option<(usize, SurfaceHit)> {
-    let window_share = keys.row_share + (share - 0.5) * keys.exposure_share;
-    first_visible(window_share, keys.views.len(), |key| {
+    let window_fraction = keys.row_fraction + (fraction - 0.5) * keys.exposure_fraction;
+    first_visible(window_fraction, keys.views.len(), |key| {
         let view = keys.views.get(key)?;
-        Some(first_surface(uv, pose_along(view.nodes, share)?, keys.nearest_w, &view.image, ideal))
+        Some(first_surface(uv, pose_along(view.nodes, fraction)?, keys.nearest_w, &view.image, ideal))
     })
 }
 
@@ -236,13 +236,13 @@ pub fn gather_silhouette(
     count: u32,
     ideal: &IdealGeometry,
 ) -> DVec3 {
-    mean_of_rays(uv, d_uv, count, |ray, share| {
-        let (key, hit) = first_surface_of_keys(ray, share, keys, ideal)?;
+    mean_of_rays(uv, d_uv, count, |ray, fraction| {
+        let (key, hit) = first_surface_of_keys(ray, fraction, keys, ideal)?;
         Some(keys.views[key].image.color(hit.position_px))
     })
 }
 
-/// Mean of `count` rays over the area of a pixel and over the exposure. `color` is that of a ray at a share of the
+/// Mean of `count` rays over the area of a pixel and over the exposure. `color` is that of a ray at a fraction of the
 /// exposure; black without one.
 pub fn mean_of_rays(
     uv: DVec2,
@@ -251,8 +251,8 @@ pub fn mean_of_rays(
     color: impl Fn(DVec2, f64) -> Option<DVec3>,
 ) -> DVec3 {
     let of_ray = |i: u32| {
-        let (place, share) = subsample(i, count);
-        color(uv + place.x * d_dx + place.y * d_dy, share).unwrap_or(DVec3::ZERO)
+        let (place, fraction) = subsample(i, count);
+        color(uv + place.x * d_dx + place.y * d_dy, fraction).unwrap_or(DVec3::ZERO)
     };
     (0..count).map(of_ray).sum::<DVec3>() / f64::from(count.max(1))
 }
@@ -364,17 +364,21 @@ mod tests {
         let pixel = 1.0 / IDEAL.focal_px.x;
         let gather = |nodes: &[(DMat3, DVec3)], uv: DVec2| {
             let views = [SupersampledKey { nodes, image }];
-            let keys =
-                SupersampledKeys { views: &views, row_share: 0.5, exposure_share: 1.0, nearest_w: ROOF };
+            let keys = SupersampledKeys {
+                views: &views,
+                row_fraction: 0.5,
+                exposure_fraction: 1.0,
+                nearest_w: ROOF,
+            };
             gather_silhouette(uv, [DVec2::new(pixel, 0.0), DVec2::new(0.0, pixel)], &keys, 64, &IDEAL)
         };
         let still = [(DMat3::IDENTITY, DVec3::ZERO)];
         for tenth in -5..=5 {
             let uv = DVec2::new(f64::from(tenth) * 0.1 * pixel, 0.0);
             let mean = gather(&still, uv);
-            let share = 0.5 - f64::from(tenth) * 0.1;
+            let fraction = 0.5 - f64::from(tenth) * 0.1;
             // Eight columns of samples per pixel.
-            assert!((mean.x - share).abs() < 0.13, "{tenth}: {mean} {share}");
+            assert!((mean.x - fraction).abs() < 0.13, "{tenth}: {mean} {fraction}");
         }
         // The border moves over two pixels during the exposure.
         let moving = [-1.0, 1.0].map(|px| (DMat3::IDENTITY, DVec3::new(px * pixel / ROOF, 0.0, 0.0)));
@@ -417,7 +421,8 @@ mod tests {
             }
             let expected = if u < border_u { -100.0 } else { ground_m };
             let color = |views: &[SupersampledKey<'_>]| {
-                let keys = SupersampledKeys { views, row_share: 0.1, exposure_share: 0.0, nearest_w: ROOF };
+                let keys =
+                    SupersampledKeys { views, row_fraction: 0.1, exposure_fraction: 0.0, nearest_w: ROOF };
                 let (key, hit) = first_surface_of_keys(DVec2::new(u, 0.0), 0.5, &keys, &IDEAL).unwrap();
                 (views[key].image.color(hit.position_px).x - expected).abs()
             };
@@ -431,7 +436,7 @@ mod tests {
 
     #[test]
     fn nearest_keys_come_first() {
-        let order = |share: f64, count: usize| nearest_first(share, count).collect::<Vec<_>>();
+        let order = |fraction: f64, count: usize| nearest_first(fraction, count).collect::<Vec<_>>();
         assert_eq!(order(0.1, 2), [0, 1]);
         assert_eq!(order(0.9, 2), [1, 0]);
         assert_eq!(order(0.5, 2), [0, 1]);

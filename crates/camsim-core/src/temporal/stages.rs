@@ -33,7 +33,7 @@ impl NodeDepths {
         mut add: impl FnMut(usize, f64),
     ) {
         let Some(last) = count.checked_sub(1) else { return };
-        let share = |node: usize| node as f64 / last.max(1) as f64;
+        let fraction = |node: usize| node as f64 / last.max(1) as f64;
         match self {
             Self::Mid => {
                 let middle = look_up(None, None);
@@ -42,13 +42,13 @@ impl NodeDepths {
             Self::Ends => {
                 let first = look_up(Some(0), None);
                 let change = look_up(Some(last), Some(first)) - first;
-                (0..count).for_each(|node| add(node, first + share(node) * change));
+                (0..count).for_each(|node| add(node, first + fraction(node) * change));
             }
             Self::Three => {
                 let middle = look_up(None, None);
                 let [begin, end] = [0, last].map(|node| look_up(Some(node), Some(middle)));
                 let between = parabola_through([begin, middle, end]);
-                (0..count).for_each(|node| add(node, between(share(node))));
+                (0..count).for_each(|node| add(node, between(fraction(node))));
             }
             Self::Each => {
                 let mut before = None;

@@ -193,9 +193,9 @@ pub trait Supersampled {
         let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
         for (x, y, c) in four {
             if one_surface || (c.inverse_depth > between) == (depth > between) {
-                let share = if x == 1 { t.x } else { 1.0 - t.x } * if y == 1 { t.y } else { 1.0 - t.y };
-                sum += share * c.color;
-                weight += share;
+                let fraction = if x == 1 { t.x } else { 1.0 - t.x } * if y == 1 { t.y } else { 1.0 - t.y };
+                sum += fraction * c.color;
+                weight += fraction;
             }
         }
         if weight > MIN_WEIGHT {

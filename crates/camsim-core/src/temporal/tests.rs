@@ -19,10 +19,10 @@ fn plane_image(ideal: &IdealGeometry, normal: DVec3) -> Vec<f32> {
 
 #[test]
 fn parabola_through_three_values() {
-    let parabola = |share: f64| 3.0 - 2.0 * share + 0.7 * share * share;
+    let parabola = |fraction: f64| 3.0 - 2.0 * fraction + 0.7 * fraction * fraction;
     let through = parabola_through([0.0, 0.5, 1.0].map(parabola));
-    for share in [0.0, 0.2, 0.5, 0.85, 1.0] {
-        assert!((through(share) - parabola(share)).abs() < 1e-14, "{share}");
+    for fraction in [0.0, 0.2, 0.5, 0.85, 1.0] {
+        assert!((through(fraction) - parabola(fraction)).abs() < 1e-14, "{fraction}");
     }
 }
 

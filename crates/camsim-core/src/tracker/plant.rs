@@ -33,7 +33,7 @@ use crate::{
 const LINEAR_GAIN_HZ: f64 = 8.0;
 /// Bound on gain times step: at lower control rates the linear zone grows, instead of oscillating.
 const LARGEST_GAIN_STEP: f64 = 0.16;
-/// Share of the acceleration limit available for braking; the rest is for the target's own acceleration and
+/// Fraction of the acceleration limit available for braking; the rest is for the target's own acceleration and
 /// the finite tick.
 const BRAKING_SHARE: f64 = 0.8;
 /// Relative excess beyond which a demand counts as limited; it is above rounding.

@@ -61,9 +61,9 @@ pub struct TrackReport {
     pub max_error: Channels,
     /// Largest velocities and accelerations.
     pub max_used: MotionUse,
-    /// Share of ticks at which the acceleration along north, east, down changes sign, 0 to 1.
+    /// Fraction of ticks at which the acceleration along north, east, down changes sign, 0 to 1.
     pub sign_changes_ned: [f64; 3],
-    /// Share of ticks at which the angular acceleration about body x, y, z changes sign, 0 to 1.
+    /// Fraction of ticks at which the angular acceleration about body x, y, z changes sign, 0 to 1.
     pub sign_changes_body: [f64; 3],
 }
 
@@ -106,9 +106,9 @@ impl TrackReport {
         }
         report.rms = Channels::from(squares.map(|square| (square / samples as f64).sqrt()));
         report.max_error = Channels::from(worst);
-        let shares = signs.map(|sign| sign.changes as f64 / samples as f64);
-        report.sign_changes_ned = [shares[0], shares[1], shares[2]];
-        report.sign_changes_body = [shares[3], shares[4], shares[5]];
+        let fractions = signs.map(|sign| sign.changes as f64 / samples as f64);
+        report.sign_changes_ned = [fractions[0], fractions[1], fractions[2]];
+        report.sign_changes_body = [fractions[3], fractions[4], fractions[5]];
         Some(report)
     }
 }

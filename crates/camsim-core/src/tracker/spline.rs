@@ -21,7 +21,7 @@ use crate::trajectory::so3;
 /// Time constant of the unconstrained fit, lambda = tau^4. With it, a position quantum of a GNSS log (0.11 m)
 /// stays below 2 g.
 const TIME_CONSTANT_S: f64 = 0.05;
-/// Share of the acceleration limit used in planning; the rest absorbs the coupling of rotation axes.
+/// Fraction of the acceleration limit used in planning; the rest absorbs the coupling of rotation axes.
 const PLANNED_SHARE: f64 = 0.97;
 /// Most passes; the plant cuts what still exceeds the limits then.
 const MAX_PASSES: usize = 20;

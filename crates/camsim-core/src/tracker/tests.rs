@@ -156,11 +156,11 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
             let name = format!("{kind:?} at {rate_hz} Hz: {rms:?}");
             let channels = [rms.north_m, rms.east_m, rms.down_m, rms.roll_deg, rms.pitch_deg, rms.yaw_deg];
             assert!(channels.into_iter().zip(most).all(|(own, most)| own < most), "{name}");
-            for share in report.sign_changes_ned.into_iter().chain(report.sign_changes_body) {
+            for fraction in report.sign_changes_ned.into_iter().chain(report.sign_changes_body) {
                 // No chatter, which would be 100 %. The rest are sign changes of the log's own noise, of
                 // which `spline` keeps up to 7 per second.
                 let most = if kind == TrackerKind::Sqrt { 0.03 } else { 0.03f64.max(7.5 / rate_hz) };
-                assert!(share <= most, "{name}: {share}");
+                assert!(fraction <= most, "{name}: {fraction}");
             }
             assert!(
                 report.max_used.acceleration_m_s2 <= 19.6

@@ -53,7 +53,7 @@ fn check_light(check: &mut Check, light: &LightSpec) {
     // The sum must not exceed white; exposure is a matter of the camera. A small tolerance allows sums like
     // 0.7 + 0.3. Each value by itself has its own interval.
     let both = light.sun + light.sky;
-    let each = [light.sun, light.sky].iter().all(|share| (0.0..=1.0).contains(share));
+    let each = [light.sun, light.sky].iter().all(|fraction| (0.0..=1.0).contains(fraction));
     check.require(!each || both <= 1.0 + 1e-9, "scene.light.sky", || {
         format!("makes {both} with scene.light.sun, and both together must be at most 1; camera.photometric.light makes pictures brighter")
     });

@@ -138,8 +138,8 @@ fn judge_pixels(set: &Set, border: Option<&Rim>) -> usize {
     let (name, camera) = (&set.name, &set.camera);
     let mut judged = 0;
     for k in 0..20 * 20 {
-        let share = DVec2::new(f64::from(k % 20), f64::from(k / 20)) / 19.0;
-        let px = share * DVec2::from(camera.size_px.map(|side| f64::from(side - 1)));
+        let fraction = DVec2::new(f64::from(k % 20), f64::from(k / 20)) / 19.0;
+        let px = fraction * DVec2::from(camera.size_px.map(|side| f64::from(side - 1)));
         let answer = camera.ray(px);
         if let Some(found) = answer {
             let off_px = (camera.project_ray(found) - px).length();

@@ -11,8 +11,8 @@ pub fn winding(polygon: &[DVec2], point: DVec2) -> (i32, f64) {
         let b = polygon[(i + 1) % polygon.len()];
         let (to_a, along) = (*a - point, b - *a);
         turned += to_a.angle_to(b - point);
-        let share = (-to_a.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
-        distance = distance.min((to_a + along * share).length());
+        let fraction = (-to_a.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+        distance = distance.min((to_a + along * fraction).length());
     }
     ((turned / TAU).round() as i32, distance)
 }

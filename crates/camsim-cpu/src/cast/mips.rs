@@ -93,15 +93,15 @@ impl MipChain {
     pub fn read(&self, uv: DVec2, level: f64, sampling: Sampling) -> Vec4 {
         let last = self.levels.len();
         let level = level.max(0.0).min(last as f64);
-        let (below, share) = (level.floor() as usize, level.fract() as f32);
+        let (below, fraction) = (level.floor() as usize, level.fract() as f32);
         let mut color = self.read_level(uv, below, sampling);
         // Nearest texels are those of the full-size picture when that alone is read.
-        if share > 0.0 {
+        if fraction > 0.0 {
             let smoothed = Sampling { nearest: false, ..sampling };
             if sampling.nearest && below == 0 {
                 color = self.read_level(uv, 0, smoothed);
             }
-            color = color.lerp(self.read_level(uv, below + 1, smoothed), share);
+            color = color.lerp(self.read_level(uv, below + 1, smoothed), fraction);
         }
         match sampling.premultiplied {
             true => (color.truncate() * color.w).extend(color.w),
@@ -139,8 +139,8 @@ fn bilinear(uv: DVec2, size_px: [u32; 2], sampling: Sampling, texel: impl Fn(usi
     if sampling.nearest {
         return texel(y.first * width + x.first);
     }
-    let row = |y: usize| texel(y * width + x.first).lerp(texel(y * width + x.second), x.share);
-    row(y.first).lerp(row(y.second), y.share)
+    let row = |y: usize| texel(y * width + x.first).lerp(texel(y * width + x.second), x.fraction);
+    row(y.first).lerp(row(y.second), y.fraction)
 }
 
 /// The two texels on both sides of a coordinate.
@@ -148,7 +148,7 @@ struct TexelPair {
     first: usize,
     second: usize,
     /// Weight of the second.
-    share: f32,
+    fraction: f32,
 }
 
 /// `nearest`: the first texel is the nearest one.
@@ -179,7 +179,7 @@ fn axis(coordinate: f64, size: u32, wrap: Wrap, nearest: bool) -> TexelPair {
     TexelPair {
         first: texel(first),
         second: texel(first.saturating_add(1)),
-        share: (position - below) as f32,
+        fraction: (position - below) as f32,
     }
 }
 

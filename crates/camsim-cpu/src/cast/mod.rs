@@ -31,12 +31,12 @@ mod trace;
 use mips::MipChain;
 pub use moving::{Instant, MovingCaster, RayScratch};
 use shade::{KeyCamera, SurfaceShader};
-use shadow::{SeenLight, SurfaceSuns, share_of_sun};
+use shadow::{SeenLight, SurfaceSuns, fraction_of_sun};
 use trace::{Hits, OpaqueHit, SceneRay, SceneTrees, Triangle, terrain_triangle};
 
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
 const FOG_AT_VISIBILITY: f64 = 3.912;
-/// Share of the light from behind blended surfaces below which nothing is seen of it.
+/// Fraction of the light from behind blended surfaces below which nothing is seen of it.
 const HIDDEN: f32 = 1e-7;
 /// Distance from an edge pixel at which samples are read for an edge line, pixels.
 const READ_PX: usize = 5;
@@ -131,7 +131,7 @@ struct FrameCaster<'a> {
 #[derive(Debug, Default)]
 struct PixelScratch {
     hits: [Hits; SAMPLES],
-    shares: Vec<TriangleShare>,
+    fractions: Vec<TriangleShare>,
 }
 
 /// The samples of a pixel that show one triangle.
@@ -140,7 +140,7 @@ struct TriangleShare {
     triangle: Triangle,
     /// A bit for each sample.
     samples: u8,
-    /// Sum of their shares of the sun.
+    /// Sum of their fractions of the sun.
     sun: f64,
     /// Linear R G B times alpha, and alpha; once it is needed.
     color: Option<glam::Vec4>,
@@ -239,7 +239,7 @@ impl<'a> FrameCaster<'a> {
         }
     }
 
-    /// Linear R G B and inverse depth (1/m) of the ray of a position, and what light it sees. The share of the
+    /// Linear R G B and inverse depth (1/m) of the ray of a position, and what light it sees. The fraction of the
     /// sun is that of the ray, or from `suns`.
     fn middle(
         &self,
@@ -253,7 +253,7 @@ impl<'a> FrameCaster<'a> {
         let mut color = |triangle: &Triangle, t: f64| {
             let sun = self.sun(triangle, t, &ray);
             seen.add(triangle.surface, sun);
-            self.shader.color(triangle, position_px, share_of_sun(triangle.surface, sun, suns))
+            self.shader.color(triangle, position_px, fraction_of_sun(triangle.surface, sun, suns))
         };
         for hit in &hits.blended {
             let Some(color) = color(&hit.triangle(), hit.t) else { continue };
@@ -271,15 +271,15 @@ impl<'a> FrameCaster<'a> {
 
     /// Linear R G B and inverse depths (1/m) of a pixel's samples, and what light they see. Each triangle is
     /// shaded once: at the mean place of the samples that show it where its texture ends with it, else at the
-    /// pixel's middle; with the mean of their shares of the sun, or that from `suns`.
+    /// pixel's middle; with the mean of their fractions of the sun, or that from `suns`.
     fn pixel_samples(
         &self,
         middle_px: DVec2,
         scratch: &mut PixelScratch,
         suns: Option<&SurfaceSuns>,
     ) -> ([Vec3; SAMPLES], [f32; SAMPLES], SeenLight) {
-        let PixelScratch { hits, shares } = scratch;
-        shares.clear();
+        let PixelScratch { hits, fractions } = scratch;
+        fractions.clear();
         let (mut opaque, mut seen) = ([None; SAMPLES], SeenLight::default());
         for (k, (hits, place)) in hits.iter_mut().zip(SAMPLE_POSITIONS).enumerate() {
             self.trace(middle_px + place, hits);
@@ -289,22 +289,22 @@ impl<'a> FrameCaster<'a> {
             for (triangle, t) in hits.blended.iter().map(|hit| (hit.triangle(), hit.t)).chain(first) {
                 let sun = self.sun(&triangle, t, &ray);
                 seen.add(triangle.surface, sun);
-                let sun = share_of_sun(triangle.surface, sun, suns);
-                match shares.iter_mut().find(|share| share.triangle == triangle) {
-                    Some(share) => {
-                        share.samples |= 1 << k;
-                        share.sun += sun;
+                let sun = fraction_of_sun(triangle.surface, sun, suns);
+                match fractions.iter_mut().find(|fraction| fraction.triangle == triangle) {
+                    Some(fraction) => {
+                        fraction.samples |= 1 << k;
+                        fraction.sun += sun;
                     }
-                    None => shares.push(TriangleShare { triangle, samples: 1 << k, sun, color: None }),
+                    None => fractions.push(TriangleShare { triangle, samples: 1 << k, sun, color: None }),
                 }
             }
         }
         let mut color = |triangle: Triangle| {
-            let share = shares.iter_mut().find(|share| share.triangle == triangle)?;
-            if share.color.is_none() {
-                share.color = self.share_color(share, middle_px);
+            let fraction = fractions.iter_mut().find(|fraction| fraction.triangle == triangle)?;
+            if fraction.color.is_none() {
+                fraction.color = self.share_color(fraction, middle_px);
             }
-            share.color
+            fraction.color
         };
         let colors = [0, 1, 2, 3].map(|k: usize| {
             let (mut sum, mut left) = (Vec3::ZERO, 1.0);
@@ -322,18 +322,18 @@ impl<'a> FrameCaster<'a> {
         (colors, [0, 1, 2, 3].map(|k: usize| self.inverse_depth(&hits[k])), seen)
     }
 
-    fn share_color(&self, share: &TriangleShare, middle_px: DVec2) -> Option<glam::Vec4> {
-        let places = (0..SAMPLES).filter(|k| share.samples & (1 << k) != 0).map(|k| SAMPLE_POSITIONS[k]);
-        let mean = places.clone().sum::<DVec2>() / f64::from(share.samples.count_ones());
-        let mesh = share.triangle.surface.checked_sub(1).map(|i| &self.shader.scene.meshes[i as usize]);
+    fn share_color(&self, fraction: &TriangleShare, middle_px: DVec2) -> Option<glam::Vec4> {
+        let places = (0..SAMPLES).filter(|k| fraction.samples & (1 << k) != 0).map(|k| SAMPLE_POSITIONS[k]);
+        let mean = places.clone().sum::<DVec2>() / f64::from(fraction.samples.count_ones());
+        let mesh = fraction.triangle.surface.checked_sub(1).map(|i| &self.shader.scene.meshes[i as usize]);
         // The ground, and a picture with holes, go on beyond a triangle.
         let ends = mesh.is_some_and(|mesh| mesh.material.blends || mesh.material.cutoff.is_none());
         let shading_px = middle_px + if ends { mean } else { DVec2::ZERO };
         // Seen at grazing incidence the plane may end before the pixel's middle.
-        let sun = share.sun / f64::from(share.samples.count_ones());
-        let color = self.shader.color(&share.triangle, shading_px, sun);
+        let sun = fraction.sun / f64::from(fraction.samples.count_ones());
+        let color = self.shader.color(&fraction.triangle, shading_px, sun);
         color.or_else(|| {
-            places.clone().find_map(|place| self.shader.color(&share.triangle, middle_px + place, sun))
+            places.clone().find_map(|place| self.shader.color(&fraction.triangle, middle_px + place, sun))
         })
     }
 }

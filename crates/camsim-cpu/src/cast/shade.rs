@@ -135,16 +135,16 @@ impl PlanePoint {
 /// How a colour turns dark in the shadow.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShadowTone {
-    /// Share of the light that is the sky's.
-    pub sky_share: f32,
+    /// Fraction of the light that is the sky's.
+    pub sky_fraction: f32,
     /// The part of the colour that is no reflected light: emission and fog.
     pub unlit: Vec3,
 }
 
 impl ShadowTone {
-    /// A colour in full light with a share of the sun.
+    /// A colour in full light with a fraction of the sun.
     pub fn shaded(&self, lit: Vec3, sun: f32) -> Vec3 {
-        self.unlit + (self.sky_share + sun * (1.0 - self.sky_share)) * (lit - self.unlit)
+        self.unlit + (self.sky_fraction + sun * (1.0 - self.sky_fraction)) * (lit - self.unlit)
     }
 }
 
@@ -159,7 +159,7 @@ impl SurfaceShader<'_> {
         Vec3::from_array(self.scene.sky_linear)
     }
 
-    /// Linear R G B, times alpha, and alpha of a triangle's plane at a position, with a share of the sun. `None`
+    /// Linear R G B, times alpha, and alpha of a triangle's plane at a position, with a fraction of the sun. `None`
     /// where the ray of the position does not meet the plane in front of the camera.
     pub fn color(&self, triangle: &Triangle, position_px: DVec2, sun: f64) -> Option<Vec4> {
         let ray = self.camera.ray(position_px);
@@ -184,7 +184,7 @@ impl SurfaceShader<'_> {
         let sampling = Sampling { wrap: [Wrap::Clamp; 2], nearest: false, premultiplied: false };
         let mut color = self.texture_color(0, &point, uvs, sampling).truncate();
         if sun < 1.0 {
-            let of_sky = terrain.sky_share(corners, point.weights);
+            let of_sky = terrain.sky_fraction(corners, point.weights);
             color *= (of_sky + sun * (1.0 - of_sky)) as f32;
         }
         Some(self.in_fog(color, &point, position_px).extend(1.0))
@@ -237,17 +237,20 @@ impl SurfaceShader<'_> {
             }
         };
         let point = PlanePoint::new(points, &self.camera, &ray)?;
-        let sky_share = match (mesh, &self.scene.terrain, &self.scene.light) {
+        let sky_fraction = match (mesh, &self.scene.terrain, &self.scene.light) {
             (Some(mesh), _, Some(light)) => {
                 let direction = ray.direction_ned;
                 let [of_sun, of_sky] = mesh.light_parts_at(light, triangle.corners, point.weights, direction);
                 if of_sun > 0.0 { of_sky / (of_sun + of_sky) } else { 1.0 }
             }
-            (None, Some(terrain), _) => terrain.sky_share(triangle.corners, point.weights),
+            (None, Some(terrain), _) => terrain.sky_fraction(triangle.corners, point.weights),
             _ => 1.0,
         };
         let emissive = mesh.map_or(Vec3::ZERO, |mesh| Vec3::from_array(mesh.material.emissive));
-        Some(ShadowTone { sky_share: sky_share as f32, unlit: self.in_fog(emissive, &point, position_px) })
+        Some(ShadowTone {
+            sky_fraction: sky_fraction as f32,
+            unlit: self.in_fog(emissive, &point, position_px),
+        })
     }
 
     /// Prefiltered texture of a surface.

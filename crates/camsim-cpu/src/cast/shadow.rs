@@ -1,7 +1,7 @@
 //! Shadows of the sun: rays from what the camera's rays meet.
 //!
 //! A first pass takes a ray to the sun from every ray of the camera. Where light and shadow meet within three
-//! by three pixels, a second one finds the share of each surface in a pixel that the sun shines on, by rays
+//! by three pixels, a second one finds the fraction of each surface in a pixel that the sun shines on, by rays
 //! spread evenly over the pixel.
 
 use camsim_core::scene::Terrain;
@@ -74,19 +74,19 @@ impl SurfaceSuns {
         }
     }
 
-    pub fn share(&self, surface: u32) -> Option<f64> {
+    pub fn fraction(&self, surface: u32) -> Option<f64> {
         let of = self.0.iter().find(|of| of.0 == surface)?;
         Some(f64::from(of.2) / f64::from(of.1))
     }
 }
 
-/// Share of the sun that a surface has where a ray meets it, or over the pixel if that is known.
-pub(super) fn share_of_sun(surface: u32, sun: Sun, suns: Option<&SurfaceSuns>) -> f64 {
+/// Fraction of the sun that a surface has where a ray meets it, or over the pixel if that is known.
+pub(super) fn fraction_of_sun(surface: u32, sun: Sun, suns: Option<&SurfaceSuns>) -> f64 {
     let own = if matches!(sun, Sun::Shining | Sun::NoMatter) { 1.0 } else { 0.0 };
     if own == 0.0 && !is_in_shadow(surface, sun) {
         return own;
     }
-    suns.and_then(|suns| suns.share(surface)).unwrap_or(own)
+    suns.and_then(|suns| suns.fraction(surface)).unwrap_or(own)
 }
 
 /// Whether the sun has a part in the light on a triangle of the terrain.
@@ -139,7 +139,7 @@ impl FrameCaster<'_> {
         self.sunlit.is_some_and(|sunlit| sunlit.is_lit(terrain, triangle.chunk, cell))
     }
 
-    /// Values of all pixels by their middles. Those at borders of shadows are made again, with the shares of
+    /// Values of all pixels by their middles. Those at borders of shadows are made again, with the fractions of
     /// the sun over the pixel.
     pub(super) fn pixels<T: Send + Clone>(
         &self,
@@ -166,7 +166,7 @@ impl FrameCaster<'_> {
         values
     }
 
-    /// Shares of the sun over a pixel.
+    /// Fractions of the sun over a pixel.
     pub(super) fn suns(&self, middle_px: DVec2, rays: u32, hits: &mut Hits) -> SurfaceSuns {
         let mut suns = SurfaceSuns::default();
         for position_px in lattice(middle_px, rays) {

@@ -3,7 +3,7 @@
 //! The rasteriser draws everything in full light, and terrain and models with as few triangles as will do.
 //! Here the ray of each pixel's middle finds the surface at full detail, from the triangle beside that of the
 //! pixel before, and a ray from there to the sun tells whether the pixel's colour turns to that of the shadow.
-//! At borders of shadows the share of the sun is that of rays over the pixel; pixels of several samples in
+//! At borders of shadows the fraction of the sun is that of rays over the pixel; pixels of several samples in
 //! which different surfaces meet beside a shadow are cast anew.
 
 use camsim_core::scene::{TerrainTriangle, WalkHit};
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::{
     CastScene, FrameCaster, PixelScratch,
     shade::ShadowTone,
-    shadow::{SeenLight, SurfaceSuns, lattice, share_of_sun},
+    shadow::{SeenLight, SurfaceSuns, fraction_of_sun, lattice},
     trace::{Hits, Triangle},
 };
 use crate::ideal::RasterFrame;
@@ -30,7 +30,7 @@ const CHANNELS: usize = 4;
 struct Middle {
     triangle: Option<Triangle>,
     seen: SeenLight,
-    /// Share of the sun.
+    /// Fraction of the sun.
     sun: f32,
     /// Inverse depth, 1/m, and the terrain's triangle there or beside it.
     inverse_depth: f64,
@@ -119,8 +119,8 @@ impl Pass<'_> {
             false => self.caster.suns(middle_px, self.border_rays, &mut scratch.hits[0]),
         });
         let triangle = middle.triangle?;
-        let of_pixel = suns.as_ref().and_then(|suns| suns.share(triangle.surface));
-        let sun = of_pixel.map_or(middle.sun, |share| share as f32);
+        let of_pixel = suns.as_ref().and_then(|suns| suns.fraction(triangle.surface));
+        let sun = of_pixel.map_or(middle.sun, |fraction| fraction as f32);
         if sun >= 1.0 {
             return None;
         }
@@ -130,7 +130,7 @@ impl Pass<'_> {
 }
 
 impl Pass<'_> {
-    /// Shares of the sun over a pixel that shows one surface.
+    /// Fractions of the sun over a pixel that shows one surface.
     fn suns_beside(&self, middle: &Middle, middle_px: DVec2, hits: &mut Hits) -> SurfaceSuns {
         let mut suns = SurfaceSuns::default();
         for position_px in lattice(middle_px, self.border_rays) {
@@ -161,8 +161,8 @@ impl FrameCaster<'_> {
         let sun = self.sun(&triangle, t, &self.shader.camera.ray(position_px));
         let mut seen = SeenLight::default();
         seen.add(triangle.surface, sun);
-        let share = share_of_sun(triangle.surface, sun, None) as f32;
-        Middle { triangle: Some(triangle), seen, sun: share, inverse_depth: t.recip(), ground: *before }
+        let fraction = fraction_of_sun(triangle.surface, sun, None) as f32;
+        Middle { triangle: Some(triangle), seen, sun: fraction, inverse_depth: t.recip(), ground: *before }
     }
 
     fn first_surface(

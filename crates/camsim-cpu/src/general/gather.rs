@@ -110,12 +110,12 @@ impl Gather {
             return self.solver.source(uv, &exposure.mid, key).position_px;
         };
         let path = self.path(uv, exposure, key, nodes_px);
-        let share = (phase + 0.5).clamp(0.0, 1.0);
+        let fraction = (phase + 0.5).clamp(0.0, 1.0);
         match *path.nodes_px {
-            [first, .., last] if self.paper => first.lerp(last, share),
+            [first, .., last] if self.paper => first.lerp(last, fraction),
             _ => {
                 let mut curves = path::curves(path.nodes_px, blur.path);
-                let elapsed = share * curves.len() as f64;
+                let elapsed = fraction * curves.len() as f64;
                 let number = (elapsed as usize).min(curves.len().saturating_sub(1));
                 let steps = f64::from(blur.path.steps()) * (elapsed - number as f64);
                 curves.nth(number).map_or(path.nodes_px[0], |curve| curve.at(steps))

@@ -172,7 +172,7 @@ impl<'a> ReversePass<'a> {
             RayStage::GaussNewton if is_dark && !self.plan.truth => Ray::default(),
             _ => self.rays.ray(position)?,
         };
-        let key = nearest_first(self.rows.shares(position)[0], self.keys.len()).next().unwrap_or_default();
+        let key = nearest_first(self.rows.fractions(position)[0], self.keys.len()).next().unwrap_or_default();
         let pixel = Pixel { position, ray, key, exposure: self.rows.exposure(key, position) };
         let (mut color, mut silhouette) = (DVec3::ZERO, None);
         if !is_dark {

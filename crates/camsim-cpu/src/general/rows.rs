@@ -72,12 +72,12 @@ pub(super) struct Exposure<'a> {
 }
 
 impl Exposure<'_> {
-    /// Pose at a share of the exposure, linear between nodes.
-    pub fn pose(&self, share: f64) -> Pose {
-        if share == 0.5 || self.nodes.len() < 2 {
+    /// Pose at a fraction of the exposure, linear between nodes.
+    pub fn pose(&self, fraction: f64) -> Pose {
+        if fraction == 0.5 || self.nodes.len() < 2 {
             return self.mid;
         }
-        let along = share * (self.nodes.len() - 1) as f64;
+        let along = fraction * (self.nodes.len() - 1) as f64;
         let node = (along as usize).min(self.nodes.len() - 2);
         self.nodes[node].mix(&self.nodes[node + 1], along - node as f64)
     }
@@ -87,9 +87,9 @@ impl Exposure<'_> {
 #[derive(Debug)]
 pub(super) struct Rows {
     poses: Vec<Pose>,
-    /// Mid-exposure of every field and row, and its exposure time, as shares of the window; empty with one key
+    /// Mid-exposure of every field and row, and its exposure time, as fractions of the window; empty with one key
     /// frame.
-    shares: Vec<[f64; 2]>,
+    fractions: Vec<[f64; 2]>,
     axis: RowAxis,
     /// Rows of a field.
     rows: usize,
@@ -107,7 +107,7 @@ impl Rows {
         let [rows, fields, keys] = [rows as usize, fields as usize, plan.keys.len()];
         let stride = plan.blur.map_or(1, |blur| if blur.nodes > 1 { blur.nodes as usize + 1 } else { 1 });
         let entries = keys * fields * rows * stride;
-        let mut shares = Vec::new();
+        let mut fractions = Vec::new();
         let poses = match table {
             _ if plan.temporal == TemporalStage::Identity => vec![Pose::IDENTITY; entries],
             RowTable::Poses(table) => {
@@ -115,7 +115,7 @@ impl Rows {
                 let all = entries + if has_references { keys } else { 0 };
                 if keys > 1 {
                     let of_row = |entry: &[[f32; 4]; 3]| [entry[0][0], entry[0][1]].map(f64::from);
-                    shares.extend(table.entries[all..].iter().map(of_row));
+                    fractions.extend(table.entries[all..].iter().map(of_row));
                 }
                 table.entries[..all].iter().map(Pose::from_entry).collect()
             }
@@ -125,7 +125,7 @@ impl Rows {
             }
         };
         assert!(poses.len() >= entries, "a table of {} entries for {entries}", poses.len());
-        Self { poses, shares, axis, rows, fields, stride, keys }
+        Self { poses, fractions, axis, rows, fields, stride, keys }
     }
 
     /// Index of a pixel's row; the rows of the second field follow those of the first.
@@ -147,8 +147,8 @@ impl Rows {
         self.poses.get(self.keys * self.fields * self.rows * self.stride + key).copied()
     }
 
-    /// Mid-exposure of a pixel's row, and its exposure time, as shares of the window.
-    pub fn shares(&self, pixel: [u32; 2]) -> [f64; 2] {
-        self.shares.get(self.row(pixel)).copied().unwrap_or([0.5, 1.0])
+    /// Mid-exposure of a pixel's row, and its exposure time, as fractions of the window.
+    pub fn fractions(&self, pixel: [u32; 2]) -> [f64; 2] {
+        self.fractions.get(self.row(pixel)).copied().unwrap_or([0.5, 1.0])
     }
 }

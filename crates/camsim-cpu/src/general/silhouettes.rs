@@ -298,8 +298,8 @@ impl ReversePass<'_> {
         let sees_several =
             silhouette.marked || self.gather.solver.has_parallax() && !self.sees_one_surface(pixel);
         sees_several.then(|| {
-            mean_of_rays(pixel.ray.uv, pixel.ray.d_uv, count, |uv, share| {
-                let (image, hit) = self.first_surface_of_keys(pixel, uv, share)?;
+            mean_of_rays(pixel.ray.uv, pixel.ray.d_uv, count, |uv, fraction| {
+                let (image, hit) = self.first_surface_of_keys(pixel, uv, fraction)?;
                 Some(image.color(hit.position_px))
             })
         })
@@ -317,8 +317,8 @@ impl ReversePass<'_> {
             [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]]
                 .map(|[x, y]| pixel.ray.uv + x * d_dx + y * d_dy)
         };
-        let shares: &[f64] = if pixel.exposure.nodes.len() > 1 { &[0.0, 0.5, 1.0] } else { &[0.5] };
-        shares.iter().map(|&share| pixel.exposure.pose(share)).all(|pose| {
+        let fractions: &[f64] = if pixel.exposure.nodes.len() > 1 { &[0.0, 0.5, 1.0] } else { &[0.5] };
+        fractions.iter().map(|&fraction| pixel.exposure.pose(fraction)).all(|pose| {
             !solver.is_near_silhouette(pixel.ray.uv, &pose, image)
                 || corners().into_iter().all(|uv| {
                     let hit = solver.first_surface(uv, &pose, image);
@@ -328,38 +328,38 @@ impl ReversePass<'_> {
         })
     }
 
-    /// First intersection of a ray at a share of the exposure: in the key frame that is nearest in time, or
+    /// First intersection of a ray at a fraction of the exposure: in the key frame that is nearest in time, or
     /// in the next nearest where the point is visible.
     pub(super) fn first_surface_of_keys(
         &self,
         pixel: &Pixel<'_>,
         uv: DVec2,
-        share: f64,
+        fraction: f64,
     ) -> Option<(&SilhouetteImage<'_>, SurfaceHit)> {
-        let [row_share, exposure_share] = self.rows.shares(pixel.position);
-        let window_share = row_share + (share - 0.5) * exposure_share;
-        let (number, hit) = first_visible(window_share, self.keys.len(), |number| {
-            let pose = self.rows.exposure(number, pixel.position).pose(share);
+        let [row_fraction, exposure_fraction] = self.rows.fractions(pixel.position);
+        let window_fraction = row_fraction + (fraction - 0.5) * exposure_fraction;
+        let (number, hit) = first_visible(window_fraction, self.keys.len(), |number| {
+            let pose = self.rows.exposure(number, pixel.position).pose(fraction);
             let image = self.keys[number].silhouettes.as_ref()?;
             Some(self.gather.solver.first_surface(uv, &pose, image))
         })?;
         Some((self.keys[number].silhouettes.as_ref()?, hit))
     }
 
-    /// Whether the parallax of a pixel's centre ray passes a silhouette at a share of the exposure.
-    pub(super) fn is_near_silhouette(&self, pixel: &Pixel<'_>, share: f64) -> bool {
-        let pose = pixel.exposure.pose(share);
+    /// Whether the parallax of a pixel's centre ray passes a silhouette at a fraction of the exposure.
+    pub(super) fn is_near_silhouette(&self, pixel: &Pixel<'_>, fraction: f64) -> bool {
+        let pose = pixel.exposure.pose(fraction);
         self.keys[pixel.key]
             .silhouettes
             .as_ref()
             .is_some_and(|image| self.gather.solver.is_near_silhouette(pixel.ray.uv, &pose, image))
     }
 
-    /// First intersection of a pixel's centre ray at a share of the exposure: position in the key frame, and
+    /// First intersection of a pixel's centre ray at a fraction of the exposure: position in the key frame, and
     /// inverse depth in the row's camera, 1/m.
-    pub(super) fn centre_hit(&self, pixel: &Pixel<'_>, share: f64) -> Option<(DVec2, f64)> {
-        let (image, hit) = self.first_surface_of_keys(pixel, pixel.ray.uv, share)?;
-        let pose = pixel.exposure.pose(share);
+    pub(super) fn centre_hit(&self, pixel: &Pixel<'_>, fraction: f64) -> Option<(DVec2, f64)> {
+        let (image, hit) = self.first_surface_of_keys(pixel, pixel.ray.uv, fraction)?;
+        let pose = pixel.exposure.pose(fraction);
         let w = self.smooth_depth(&self.keys[pixel.key], image, pixel.ray.uv, &pose, hit.row_inverse_depth);
         Some((image.ideal().px_from_point(self.gather.solver.point(pixel.ray.uv, &pose, w)), w))
     }

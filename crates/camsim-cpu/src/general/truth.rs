@@ -16,15 +16,15 @@ struct VisiblePoint {
 impl ReversePass<'_> {
     /// Truth of a pixel by the temporal inverse; near silhouettes by its centre ray.
     pub(super) fn truth(&self, pixel: &Pixel<'_>, may_see_several: bool, nodes_px: &mut Vec<DVec2>) -> Truth {
-        let near = |share: f64| may_see_several && self.is_near_silhouette(pixel, share);
-        let phase_share = self.coords_phase + 0.5;
+        let near = |fraction: f64| may_see_several && self.is_near_silhouette(pixel, fraction);
+        let phase_fraction = self.coords_phase + 0.5;
         if self.gather.solver.is_exact() {
-            if near(0.5) || near(phase_share) {
+            if near(0.5) || near(phase_fraction) {
                 return Truth { depth_m: -1.0, ..truth_of_ray(pixel) };
             }
             return self.truth_of(pixel, self.smooth_px(pixel, nodes_px), &self.smooth_mid(pixel));
         }
-        let source_px = match near(phase_share).then(|| self.centre_hit(pixel, phase_share)).flatten() {
+        let source_px = match near(phase_fraction).then(|| self.centre_hit(pixel, phase_fraction)).flatten() {
             // These solvers have one key frame, that of the mid-window camera.
             Some((position_px, _)) => position_px,
             None => self.smooth_px(pixel, nodes_px),

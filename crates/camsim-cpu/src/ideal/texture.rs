@@ -114,16 +114,16 @@ impl MipImage {
         sums: &mut Sums,
     ) {
         let below = per_lane(|i| clamp_to(level[i], self.last_level).floor());
-        let share = per_lane(|i| clamp_to(level[i], self.last_level) - below[i]);
-        let is_between = share.iter().any(|&share| share > 0.0);
-        let weight_below = per_lane(|i| weight[i] * (1.0 - share[i]));
+        let fraction = per_lane(|i| clamp_to(level[i], self.last_level) - below[i]);
+        let is_between = fraction.iter().any(|&fraction| fraction > 0.0);
+        let weight_below = per_lane(|i| weight[i] * (1.0 - fraction[i]));
         self.add_level(vectors, u, v, &below, &weight_below, is_active, sums);
         if is_between {
             let above = per_lane(|i| fast_min(below[i] + 1.0, self.last_level));
-            let weight_above = per_lane(|i| weight[i] * share[i]);
+            let weight_above = per_lane(|i| weight[i] * fraction[i]);
             let mut is_blended = [false; LANES];
             for i in 0..LANES {
-                is_blended[i] = is_active[i] & (share[i] > 0.0);
+                is_blended[i] = is_active[i] & (fraction[i] > 0.0);
             }
             self.add_level(vectors, u, v, &above, &weight_above, &is_blended, sums);
         }
@@ -169,8 +169,8 @@ impl MipImage {
             for k in 0..2 * CHANNELS {
                 let between = down[i].mul_add(bottom[k] - top[k], top[k]);
                 // Left texels come first.
-                let share = if k < CHANNELS { 1.0 - across[i] } else { across[i] };
-                sums[i][k] = (weight[i] * share).mul_add(between, sums[i][k]);
+                let fraction = if k < CHANNELS { 1.0 - across[i] } else { across[i] };
+                sums[i][k] = (weight[i] * fraction).mul_add(between, sums[i][k]);
             }
         }
     }
@@ -191,8 +191,8 @@ fn texel_and_weight(coordinate: &Lanes, size: &Lanes, repeats: bool) -> (Lanes, 
         position = per_lane(|i| clamp_to(position[i], size[i] - 1.0));
     }
     let first = per_lane(|i| fast_min(position[i].floor(), size[i] - 1.0));
-    let share = per_lane(|i| position[i] - first[i]);
-    (first, share)
+    let fraction = per_lane(|i| position[i] - first[i]);
+    (first, fraction)
 }
 
 /// Adds left and right sums.

@@ -166,8 +166,8 @@ impl Camera {
         polygon
     }
 
-    fn clip_point<const N: usize>(&self, a: &Vertex<N>, b: &Vertex<N>, share: f32) -> Vertex<N> {
-        let mix = |a: f32, b: f32| a + share * (b - a);
+    fn clip_point<const N: usize>(&self, a: &Vertex<N>, b: &Vertex<N>, fraction: f32) -> Vertex<N> {
+        let mix = |a: f32, b: f32| a + fraction * (b - a);
         let [x, y, z] = [0, 1, 2].map(|k| mix(a.in_camera_m[k], b.in_camera_m[k]));
         let in_camera_m = [x, y, z.max(self.uniforms.near_m)];
         self.project_within(

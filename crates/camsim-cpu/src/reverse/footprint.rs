@@ -12,7 +12,7 @@ const NARROW_AREA_PX: f32 = 1.000_05;
 /// Width of a box with the variance of one bilinear tap, ideal pixels.
 const WIDEST_SPLINE_PX: f32 = 1.732_050_8;
 
-/// Offsets of the taps of every grid, as shares of its sides, in the order in which they are read.
+/// Offsets of the taps of every grid, as fractions of its sides, in the order in which they are read.
 #[derive(Debug)]
 pub(super) struct GridTaps {
     /// Offsets of all grids, one after the other.
@@ -134,7 +134,7 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Offset of tap `tap` (cyclic) of each pixel, as shares of the sides.
+    /// Offset of tap `tap` (cyclic) of each pixel, as fractions of the sides.
     #[inline(always)]
     fn tap_offsets_at(&self, tap: &Lanes) -> Lanes2 {
         // With half a tap added, rounding cannot move the quotient past a whole number.

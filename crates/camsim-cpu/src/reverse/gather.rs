@@ -185,12 +185,12 @@ impl Stages<'_> {
         sum: &mut [[f32; 4]; LANES],
     ) {
         let steps = curve.path.steps() as f32;
-        let share = per_lane(|i| 1.0 / count[i].max(1.0));
+        let fraction = per_lane(|i| 1.0 / count[i].max(1.0));
         let max_count = count.iter().fold(0.0, |max_count: f32, &count| max_count.max(count));
         let mut curve_sum = [[0.0; 8]; LANES];
         let mut sample = 0.0;
         while sample < max_count {
-            let step = per_lane(|i| steps * share[i] * (sample + 0.5));
+            let step = per_lane(|i| steps * fraction[i] * (sample + 0.5));
             let tap = per_lane(|i| samples_taken[i] + sample);
             self.add_sample(
                 vectors,
@@ -204,7 +204,7 @@ impl Stages<'_> {
         }
         for i in 0..LANES {
             for k in 0..4 {
-                sum[i][k] += (curve_sum[i][k] + curve_sum[i][k + 4]) * share[i];
+                sum[i][k] += (curve_sum[i][k] + curve_sum[i][k + 4]) * fraction[i];
             }
         }
     }

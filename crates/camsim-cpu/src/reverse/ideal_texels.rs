@@ -150,8 +150,8 @@ impl IdealTexels<'_> {
             for k in 0..2 * CHANNELS {
                 let between = t.y[i].mul_add(bottom[k] - top[k], top[k]);
                 // Left texels come first.
-                let share = if k < CHANNELS { 1.0 - t.x[i] } else { t.x[i] };
-                sum[i][k] = (weight(i) * share).mul_add(between, sum[i][k]);
+                let fraction = if k < CHANNELS { 1.0 - t.x[i] } else { t.x[i] };
+                sum[i][k] = (weight(i) * fraction).mul_add(between, sum[i][k]);
             }
         }
     }
@@ -194,7 +194,7 @@ impl IdealTexels<'_> {
             TexelSpan::<COLUMNS>::new(&position_px.x, &sides_px.x),
             TexelSpan::<ROWS>::new(&position_px.y, &sides_px.y),
         );
-        let share = per_lane(|i| 1.0 / (sides_px.x[i] * sides_px.y[i]));
+        let fraction = per_lane(|i| 1.0 / (sides_px.x[i] * sides_px.y[i]));
         let [right, bottom] =
             [(0, COLUMNS), (1, ROWS)].map(|(k, texels)| frame.ideal_size_px[k] as f32 - texels as f32);
         let mut is_inside_frame = true;
@@ -206,7 +206,7 @@ impl IdealTexels<'_> {
             is_inside_frame &= !is_taken(i) | is_inside;
         }
         if !is_inside_frame {
-            return self.add_pairs(vectors, frame, &columns, &rows, &share, is_taken, sum);
+            return self.add_pairs(vectors, frame, &columns, &rows, &fraction, is_taken, sum);
         }
         let stride = CHANNELS * self.color_stride as usize;
         for i in 0..LANES {
@@ -229,7 +229,7 @@ impl IdealTexels<'_> {
                 }
                 for k in 0..2 * CHANNELS {
                     // Left texels come first.
-                    let weight = share[i]
+                    let weight = fraction[i]
                         * if k < CHANNELS {
                             columns.weights[2 * pair][i]
                         } else {
@@ -250,7 +250,7 @@ impl IdealTexels<'_> {
         frame: &FrameUniforms,
         columns: &TexelSpan<COLUMNS>,
         rows: &TexelSpan<ROWS>,
-        share: &Lanes,
+        fraction: &Lanes,
         is_taken: impl Fn(usize) -> bool,
         sum: &mut [HalfSums; LANES],
     ) {
@@ -263,7 +263,7 @@ impl IdealTexels<'_> {
                     frame,
                     &Lanes2 { x, y },
                     &is_taken,
-                    |i| share[i] * of_row[i] * of_column[i],
+                    |i| fraction[i] * of_row[i] * of_column[i],
                     sum,
                 );
             }
@@ -322,7 +322,7 @@ impl IdealTexels<'_> {
     }
 }
 
-/// Rows or columns of texels that a rectangle touches: the first one, and the covered share of each.
+/// Rows or columns of texels that a rectangle touches: the first one, and the covered fraction of each.
 struct TexelSpan<const TEXELS: usize> {
     first: Lanes,
     weights: [Lanes; TEXELS],

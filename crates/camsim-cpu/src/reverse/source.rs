@@ -25,7 +25,7 @@ enum NodeInverseDepths {
     Solved,
     /// The result of the node before.
     Each(Lanes),
-    /// Parabola `begin + share (slope + share bend)`.
+    /// Parabola `begin + fraction (slope + fraction bend)`.
     BlockCurve { begin: Lanes, slope: Lanes, bend: Lanes },
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Nodes<'a> {
     stages: &'a Stages<'a>,
     uv: &'a Lanes2,
     depths: NodeInverseDepths,
-    node_share: f32,
+    node_fraction: f32,
 }
 
 #[inline(always)]
@@ -214,7 +214,7 @@ impl<'a> Nodes<'a> {
             }
             _ => NodeInverseDepths::Solved,
         };
-        Self { stages, uv, depths, node_share: 1.0 / last as f32 }
+        Self { stages, uv, depths, node_fraction: 1.0 / last as f32 }
     }
 
     /// Source of the next node, by its number (the first is 0) and pose.
@@ -229,9 +229,9 @@ impl<'a> Nodes<'a> {
                 self.stages.source_of_depth(self.uv, pose, |i| key_inverse_depth[i])
             }
             NodeInverseDepths::BlockCurve { begin, slope, bend } => {
-                let share = node as f32 * self.node_share;
+                let fraction = node as f32 * self.node_fraction;
                 self.stages.source_of_depth(self.uv, pose, |i| {
-                    bend[i].mul_add(share, slope[i]).mul_add(share, begin[i])
+                    bend[i].mul_add(fraction, slope[i]).mul_add(fraction, begin[i])
                 })
             }
         }

@@ -42,7 +42,7 @@ const INSTANTS: u32 = 256;
 /// How far beyond its borders an ideal frame may show a surface, ideal pixels, and beyond that in the picture.
 const IDEAL_ROOM_PX: f64 = 1.5;
 const ROOM_PX: f64 = 1.0;
-/// Least share of an ideal pixel that is allowed for, per pixel.
+/// Least fraction of an ideal pixel that is allowed for, per pixel.
 const LEAST_SCALE: f64 = 0.25;
 
 /// The lamps of a sequence: meshes that emit light above white.
@@ -227,8 +227,8 @@ impl<'a> Job<'a> {
         Some(match pixel.beside(|k, uv| !within(k, uv, 0.0)) {
             None => of_lamps / passing.max(1) as f32,
             Some(beside) => {
-                let share = passing as f32 / rays as f32;
-                of_lamps / rays as f32 + (1.0 - share) * beside
+                let fraction = passing as f32 / rays as f32;
+                of_lamps / rays as f32 + (1.0 - fraction) * beside
             }
         })
     }

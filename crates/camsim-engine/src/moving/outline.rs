@@ -17,7 +17,7 @@ use super::line_count;
 
 /// Exposure phases of the cameras that boxes are projected by.
 const PHASES: [f64; 3] = [-0.5, 0.0, 0.5];
-/// Room around the projected corners of a box, pixels, and as a share of its size: edges that a lens bends and
+/// Room around the projected corners of a box, pixels, and as a fraction of its size: edges that a lens bends and
 /// cameras that shake within an exposure.
 const ROOM_PX: f64 = 2.0;
 const ROOM: f64 = 0.1;

@@ -101,8 +101,8 @@ fn mean_color(
     let px_from_uv = DMat2::from_diagonal(camera.focal_px) * camera.lens.jacobian(uv);
     let uv_from_px = px_from_uv.inverse();
     // Each ray stands for its part of the pixel's area.
-    let share = f64::from(instants.len() as u32).sqrt().recip();
-    let step_uv = share * DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length());
+    let fraction = f64::from(instants.len() as u32).sqrt().recip();
+    let step_uv = fraction * DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length());
     let ray = |(place, instant): &(DVec2, Instant)| {
         caster.color(instant, uv + uv_from_px * *place, step_uv, plan.surface_reads, scratch)
     };

@@ -1,6 +1,6 @@
-//! Share of each pixel that the object at its centre has.
+//! Fraction of each pixel that the object at its centre has.
 //!
-//! A pixel is an area of 1 x 1 and an exposure of its row. Its coverage is the share of rays through that box
+//! A pixel is an area of 1 x 1 and an exposure of its row. Its coverage is the fraction of rays through that box
 //! that meet the object that the pixel's centre sees at mid-exposure. Only pixels near a border between objects
 //! (or the sky) can have less than 1: those within the reach of a pixel that has another object beside it. The
 //! reach of a pixel is the way of its point in the picture during the exposure, plus 1 px.

@@ -95,7 +95,7 @@ impl<'e> Measuring<'e> {
             judged_by: verdict.into(),
             falsely_valid: errors.falsely_valid,
             missing: errors.missing,
-            disocclusion_share: disocclusion_of(oracle, &first.plan).share(),
+            disocclusion_fraction: disocclusion_of(oracle, &first.plan).fraction(),
         };
         let truth = truth_errors(oracle, frame, &first.frame, near_px)
             .filter(|_| first.plan.has_exact_truth())
@@ -190,7 +190,7 @@ fn coords(oracle: &Oracle, done: &Finished, phase: f64) -> Result<CoordErrors, V
 fn phases(plan: &FramePlan) -> Vec<f32> {
     let Some(blur) = plan.blur else { return Vec::new() };
     let steps = f64::from(blur.solved() - 1);
-    let middle_of = |share: f64| (((share * steps).floor() + 0.5) / steps - 0.5) as f32;
+    let middle_of = |fraction: f64| (((fraction * steps).floor() + 0.5) / steps - 0.5) as f32;
     // Exactly 0 would be mid-exposure. The last two are incommensurate with vibrations.
     let phases: [f32; PHASES] = [-0.5, middle_of(0.25), middle_of(0.75), -0.309, 0.191];
     phases.map(|phase| if phase == 0.0 { 1e-4 } else { phase }).to_vec()

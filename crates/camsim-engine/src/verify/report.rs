@@ -35,7 +35,7 @@ pub struct FrameReport {
     pub predicted: Predicted,
     /// Errors of sources.
     pub measured: Measured,
-    /// Errors of depths and points, as shares of the depth; `None` for solvers that compute sources without exact
+    /// Errors of depths and points, as fractions of the depth; `None` for solvers that compute sources without exact
     /// depths.
     pub truth: Option<Kept<TruthErrors>>,
     /// Errors of the channels that the scenario asks for, and that have a value in each pixel.
@@ -104,8 +104,8 @@ pub struct Measured {
     pub falsely_valid: u64,
     /// Pixels with a source in the reference only.
     pub missing: u64,
-    /// Disoccluded share of the picture.
-    pub disocclusion_share: f64,
+    /// Disoccluded fraction of the picture.
+    pub disocclusion_fraction: f64,
 }
 
 /// Pixels that a frame is judged by.

@@ -90,12 +90,12 @@ fn expect_hills(who: &str, engine: &Engine, scene: Scene) {
     let truth = reference(&sequence);
     let done = render(engine, &sequence, &[Channel::Color], 0);
     let [borders_db, others_db] = psnr_db(&truth, done.frame.color_rgba(), &near);
-    let share = near.iter().filter(|&&near| near).count() as f64 / near.len() as f64;
+    let fraction = near.iter().filter(|&&near| near).count() as f64 / near.len() as f64;
     eprintln!(
-        "{who}: {borders_db:.1} dB within 3 px of borders ({share:.2} of the picture), {others_db:.1} dB elsewhere; {} px, {} samples",
+        "{who}: {borders_db:.1} dB within 3 px of borders ({fraction:.2} of the picture), {others_db:.1} dB elsewhere; {} px, {} samples",
         done.plan.ideal.size_px[0], done.plan.samples_a_pixel
     );
-    assert!((0.05..0.8).contains(&share), "{share}");
+    assert!((0.05..0.8).contains(&fraction), "{fraction}");
     assert!(borders_db > 38.0 && others_db > 40.0, "{who}: {borders_db} {others_db}");
 }
 

@@ -96,9 +96,9 @@ fn reference_has_the_sundials_shadow_where_trigonometry_says() {
     for k in 0..outline.len() {
         let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
         let inward = (b - a).normalize().perp();
-        for share in [0.01, 0.3, 0.5, 0.77, 0.99] {
+        for fraction in [0.01, 0.3, 0.5, 0.77, 0.99] {
             for off_m in [-1e-3, 1e-3] {
-                let point = a.lerp(b, share) + off_m * inward;
+                let point = a.lerp(b, fraction) + off_m * inward;
                 // The floor of the pole is not ground that is seen.
                 if point.abs().max_element() < HALF_M + 2e-3 {
                     continue;
@@ -131,9 +131,9 @@ fn expected_pixel(outline: &[DVec2], x: u32, y: u32) -> Option<f64> {
     if low.max(-high).max_element() < 0.5 {
         return None;
     }
-    let share = area_within(outline, low, high) / (METRES_A_PX * METRES_A_PX);
+    let fraction = area_within(outline, low, high) / (METRES_A_PX * METRES_A_PX);
     let of_sun = SUN * 35_f64.to_radians().sin();
-    Some(0.8 * (of_sun * (1.0 - share) + SKY))
+    Some(0.8 * (of_sun * (1.0 - fraction) + SKY))
 }
 
 /// Compares a picture with areas in closed form: over all pixels within 3 px of the shadow's borders, and by

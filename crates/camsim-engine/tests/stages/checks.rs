@@ -77,7 +77,7 @@ pub enum Reference {
 pub enum Statistic {
     Maximum,
     Percentile99,
-    /// Share of the pixels that differ by more than so much.
+    /// Fraction of the pixels that differ by more than so much.
     ShareBeyond([f64; 2]),
     /// RMS over components, of the pixels that differ by not more than so much.
     RmsWithin([f64; 2]),

@@ -75,12 +75,12 @@ fn ball(n: u32) -> Shape {
     let mut shape = Shape::default();
     for row in 0..=n {
         for column in 0..=2 * n {
-            let (position_m, share) = (vertex(row, column), row as f32 / n as f32);
-            let uv = [column as f32 / n as f32, 2.0 * share];
+            let (position_m, fraction) = (vertex(row, column), row as f32 / n as f32);
+            let uv = [column as f32 / n as f32, 2.0 * fraction];
             shape.vertices.push(MeshVertex {
                 position_m,
                 uv,
-                tint: [1.0 - 0.5 * share, 0.4 + 0.6 * share, 0.7, 1.0],
+                tint: [1.0 - 0.5 * fraction, 0.4 + 0.6 * fraction, 0.7, 1.0],
             });
             shape.normals.push(position_m);
         }

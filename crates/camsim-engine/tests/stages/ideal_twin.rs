@@ -79,7 +79,7 @@ pub fn ideal_twin(
 
 /// Colour of the pattern at a place; `None` at its border and outside.
 fn pattern_color_dn(ground_ned_m: DVec3, width_m: f64) -> Option<DVec3> {
-    let texel = |share: f64| 512.0 * share - 0.5;
+    let texel = |fraction: f64| 512.0 * fraction - 0.5;
     let [x, y] = [0.5 + ground_ned_m.y / width_m, 0.5 - ground_ned_m.x / width_m].map(texel);
     let inside = x > 2.0 && y > 2.0 && x < 509.0 && y < 509.0;
     let level = |k: f64, phase: f64| {

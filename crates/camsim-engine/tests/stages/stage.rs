@@ -33,11 +33,11 @@ pub enum Stage {
     Point,
     /// Validity channel.
     Valid,
-    /// Gather and photometric stage: linear colour of the output frame, shares of full scale.
+    /// Gather and photometric stage: linear colour of the output frame, fractions of full scale.
     Color,
     /// Linear colour if no other channel is asked for.
     ColorAlone,
-    /// Photometric stage alone: linear colour, shares of full scale.
+    /// Photometric stage alone: linear colour, fractions of full scale.
     Photometric,
     /// Bytes that are written, DN of sRGB.
     Bytes,

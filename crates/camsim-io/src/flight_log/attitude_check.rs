@@ -45,8 +45,8 @@ pub(super) fn notes(log: &FlightLog, raw: &RawLog) -> Vec<Note> {
     texts.into_iter().flatten().map(|text| Note::warning(text)).collect()
 }
 
-/// Share of attitudes in which an axis of the body points at least this far along down.
-fn share(attitudes: &[DQuat], axis: DVec3, is_so: impl Fn(f64) -> bool) -> f64 {
+/// Fraction of attitudes in which an axis of the body points at least this far along down.
+fn fraction(attitudes: &[DQuat], axis: DVec3, is_so: impl Fn(f64) -> bool) -> f64 {
     let count = attitudes.iter().filter(|attitude| is_so((**attitude * axis).z)).count();
     count as f64 / attitudes.len() as f64
 }
@@ -57,11 +57,11 @@ fn is_upright(down: f64) -> bool {
 
 /// Says that angles turn the body upside down or on its side.
 fn tilted_angles(attitudes: &[DQuat]) -> Option<String> {
-    if share(attitudes, DVec3::Z, |down| down < UPSIDE_DOWN) >= 0.99 {
+    if fraction(attitudes, DVec3::Z, |down| down < UPSIDE_DOWN) >= 0.99 {
         let cause = "does roll count from inverted flight, or belong to a body with z up?";
         return Some(format!("the body is upside down in every row: {cause}"));
     }
-    let lies = [DVec3::Y, -DVec3::Y].into_iter().any(|side| share(attitudes, side, is_upright) >= 0.99);
+    let lies = [DVec3::Y, -DVec3::Y].into_iter().any(|side| fraction(attitudes, side, is_upright) >= 0.99);
     lies.then(|| {
         "the body lies on its side in every row: do the angles belong to camera (optical) axes? Those of the \
             body belong here, and camera.mount says where the camera looks"
@@ -71,7 +71,7 @@ fn tilted_angles(attitudes: &[DQuat]) -> Option<String> {
 
 /// Says that quaternions do not leave the body upright, with the readings in which it would be.
 fn tilted_quaternions(attitudes: &[DQuat], reading: Option<QuaternionReading>) -> Option<String> {
-    if share(attitudes, DVec3::Z, is_upright) >= 0.5 {
+    if fraction(attitudes, DVec3::Z, is_upright) >= 0.5 {
         return None;
     }
     const AXES: &str = "do the quaternions belong to a body with other axes, as those of a camera (camera.mount \
@@ -80,7 +80,7 @@ fn tilted_quaternions(attitudes: &[DQuat], reading: Option<QuaternionReading>) -
         them to a body with x forward; camera.mount says where the camera looks";
     let mut causes = Vec::new();
     if let Some(reading) = reading
-        && share(&in_the_other_order(attitudes, reading), DVec3::Z, is_upright) > 0.95
+        && fraction(&in_the_other_order(attitudes, reading), DVec3::Z, is_upright) > 0.95
     {
         let order = if reading.is_scalar_first { "x, y, z, w" } else { "w, x, y, z" };
         causes.push(format!(
@@ -89,14 +89,14 @@ fn tilted_quaternions(attitudes: &[DQuat], reading: Option<QuaternionReading>) -
     }
     // The axis of the body that points down, and what its axes may then be.
     for (axis, cause) in [(-DVec3::Z, AXES), (DVec3::Y, OPTICAL), (-DVec3::Y, OPTICAL)] {
-        if share(attitudes, axis, is_upright) > 0.95 {
+        if fraction(attitudes, axis, is_upright) > 0.95 {
             causes.push(cause.to_owned());
         }
     }
     if causes.is_empty() {
         return None;
     }
-    let what = if share(attitudes, DVec3::Z, |down| down < UPSIDE_DOWN) >= 0.99 {
+    let what = if fraction(attitudes, DVec3::Z, |down| down < UPSIDE_DOWN) >= 0.99 {
         "is upside down in every row"
     } else {
         "is not upright in most rows"

@@ -106,11 +106,11 @@ fn read_encoded_color(
             path.display()
         ));
     }
-    if let Some(share) = transparent_share(&picture) {
+    if let Some(fraction) = transparent_fraction(&picture) {
         notes.push(format!(
             "{}: its alpha is not read: {:.1} % of the pixels are not opaque",
             path.display(),
-            100.0 * share
+            100.0 * fraction
         ));
     }
     let size_px = [picture.width(), picture.height()];
@@ -128,8 +128,8 @@ fn bit_depth_note(picture: &DynamicImage) -> Option<String> {
     ))
 }
 
-/// Share of pixels with alpha below 1; `None` if there are none.
-fn transparent_share(picture: &DynamicImage) -> Option<f64> {
+/// Fraction of pixels with alpha below 1; `None` if there are none.
+fn transparent_fraction(picture: &DynamicImage) -> Option<f64> {
     if !picture.color().has_alpha() {
         return None;
     }

@@ -19,7 +19,7 @@ const MAX_SIDE_PX: usize = 8192;
 const MAX_TEXELS: usize = 1 << 24;
 /// Largest number of baked texels along a texel of the UV layout.
 const MAX_SUBDIVISION: f64 = 8.0;
-/// Share of the covered texels that two triangles may colour differently: those along their edges.
+/// Fraction of the covered texels that two triangles may colour differently: those along their edges.
 const MAX_CONFLICT_SHARE: f64 = 2e-3;
 /// Largest difference of a channel that counts as the same colour, of 255.
 const MAX_SAME_COLOR_DIFFERENCE: u8 = 3;

@@ -9,7 +9,7 @@ use crate::terrain::TerrainSummary;
 const FRAMES: u64 = 25;
 /// Number of sampled pixels along each side of a frame.
 const SAMPLES_PER_SIDE: u32 = 12;
-/// Share of sky from which it is reported; a level camera sees half of it.
+/// Fraction of sky from which it is reported; a level camera sees half of it.
 const MOST_SKY: f64 = 0.75;
 
 /// What a sampled pixel sees.
@@ -77,12 +77,12 @@ pub(super) fn sky_warning(sequence: &Sequence) -> Option<String> {
         Some(!terrain.blocks(from, direction) && !boxes.iter().any(|bounds| is_hit(bounds, from, direction)))
     };
     let seen: Vec<bool> = samples(sequence).iter().filter_map(sees_sky).collect();
-    let share = seen.iter().filter(|is_sky| **is_sky).count() as f64 / seen.len().max(1) as f64;
-    (share > MOST_SKY).then(|| {
+    let fraction = seen.iter().filter(|is_sky| **is_sky).count() as f64 / seen.len().max(1) as f64;
+    (fraction > MOST_SKY).then(|| {
         format!(
             "about {:.0} % of the frames is sky, or places where the terrain has no heights: check camera.mount, \
              flight.height and the place of the terrain",
-            100.0 * share
+            100.0 * fraction
         )
     })
 }

@@ -93,7 +93,7 @@ const KEYS: &[(&str, &str)] = &[
         "beyond",
         "`\"grey\"` (sRGB 118), `\"edge\"` (colours of the picture's border), `\"void\"` (no ground, in \
          whole cells): the ground outside of the ortho-image, where it is masked, or where it has its \
-         no-data value. The share of the terrain and of the frames is reported",
+         no-data value. The fraction of the terrain and of the frames is reported",
     ),
 ];
 

@@ -177,8 +177,8 @@ impl Ortho {
         let Some(OrthoGeoreference { size, margin_px, .. }) = &self.georeference else {
             return [[0.0; 2], [1.0; 2]];
         };
-        let share = size.map(|side| margin_px / (side + 2.0 * margin_px));
-        [share, share.map(|share| 1.0 - share)]
+        let fraction = size.map(|side| margin_px / (side + 2.0 * margin_px));
+        [fraction, fraction.map(|fraction| 1.0 - fraction)]
     }
 
     /// Whether the image has colour at a post.

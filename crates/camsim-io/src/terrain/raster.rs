@@ -224,9 +224,9 @@ impl Raster {
                     .filter(|&pixel| f64::from(largest_value(pixel)) > white)
                     .count();
                 (clipped > 0).then(|| {
-                    let share = 100.0 * clipped as f64 / image.pixels() as f64;
+                    let fraction = 100.0 * clipped as f64 / image.pixels() as f64;
                     format!(
-                        "{share:.1} % of its pixels are brighter than scene.terrain.ortho_white = {white} \
+                        "{fraction:.1} % of its pixels are brighter than scene.terrain.ortho_white = {white} \
                          and are clipped; the largest value is {largest}"
                     )
                 })

@@ -340,7 +340,7 @@ fn sertig_is_georeferenced_correctly() {
 fn published_terrains_load() {
     let Some(data) = data() else { return };
     let folder = data.join("terrain");
-    for (dem, ortho, origin, void_share) in [
+    for (dem, ortho, origin, void_fraction) in [
         ("duebendorf/duebendorf.tif", Some("duebendorf/duebendorf_color.tif"), [47.41, 8.65], 0.0),
         ("hinwil/hinwil.tif", Some("hinwil/hinwil_color.tif"), [47.31, 8.83], 0.0),
         ("hinwil/hinwil_large_dem.tif", Some("hinwil/hinwil_color.tif"), [47.31, 8.83], 0.0),
@@ -371,8 +371,9 @@ fn published_terrains_load() {
         );
         // The centre is near the published location.
         assert!(summary.centre_ned_m.truncate().length() < 10_000.0, "{dem} {}", summary.centre_ned_m);
-        let share = summary.void_heights as f64 / (f64::from(summary.size[0]) * f64::from(summary.size[1]));
-        assert!((share - void_share).abs() < 0.01, "{dem} {share}");
+        let fraction =
+            summary.void_heights as f64 / (f64::from(summary.size[0]) * f64::from(summary.size[1]));
+        assert!((fraction - void_fraction).abs() < 0.01, "{dem} {fraction}");
         assert!(
             summary.south_west_rad[0] < summary.centre_rad[0]
                 && summary.centre_rad[1] < summary.north_east_rad[1]

@@ -10,9 +10,9 @@ use super::{Doubt, is_flat, model};
 
 /// Most samples along a side.
 const SAMPLES: u32 = 32;
-/// Share of the pixels without a ray from which on it is told.
+/// Fraction of the pixels without a ray from which on it is told.
 const NO_RAY: f64 = 0.005;
-/// Share of the pixels with a ray below which the coefficients are probably wrong.
+/// Fraction of the pixels with a ray below which the coefficients are probably wrong.
 const FEW_RAYS: f64 = 0.6;
 /// Largest usual tangential coefficient; those of published calibrations are below 0.013.
 const MOST_TANGENTIAL: f64 = 0.03;
@@ -69,21 +69,21 @@ impl Seen {
     }
 
     fn rays_doubt(&self, coefficients: &[f64]) -> Option<Doubt> {
-        let share = f64::from(self.with_ray) / f64::from(self.pixels.max(1));
-        let few = match share < FEW_RAYS && !coefficients.is_empty() {
+        let fraction = f64::from(self.with_ray) / f64::from(self.pixels.max(1));
+        let few = match fraction < FEW_RAYS && !coefficients.is_empty() {
             true => format!(
                 ": {:.0} % of the pixels have a ray, so check the order and the scale of the coefficients; see",
-                100.0 * share
+                100.0 * fraction
             ),
             false => ": see".to_owned(),
         };
-        (1.0 - share >= NO_RAY).then(|| {
+        (1.0 - fraction >= NO_RAY).then(|| {
             Doubt::new(
                 "lens",
                 format!(
                     "about {:.0} % of the picture has no ray through the lens and stays empty (alpha 0){few} `camsim \
                      lens FILE.toml check`",
-                    100.0 * (1.0 - share)
+                    100.0 * (1.0 - fraction)
                 ),
             )
         })

@@ -4,9 +4,9 @@ use camsim_core::scenario::CameraSpec;
 
 use super::Doubt;
 
-/// Share of a side around the centre, to either side, within which a principal point is usual.
+/// Fraction of a side around the centre, to either side, within which a principal point is usual.
 const USUAL: f64 = 0.2;
-/// Shares of a side around the border that count as the corner.
+/// Fractions of a side around the border that count as the corner.
 const CORNER: f64 = 0.02;
 /// Ratio of a principal point to the centre from which on another size is likely, if both axes agree.
 const OTHER_SIZE: f64 = 1.15;
@@ -17,17 +17,18 @@ const OTHER_ASPECT: f64 = 1.3;
 pub(super) fn doubt_of_other_picture(camera: &CameraSpec) -> Option<Doubt> {
     let point = camera.principal_point_px?;
     let size = camera.size_px.map(f64::from);
-    let shares = shares(point, size);
-    let is_corner = shares.iter().all(|share| share.abs() < CORNER || (share - 1.0).abs() < CORNER);
+    let fractions = fractions(point, size);
+    let is_corner =
+        fractions.iter().all(|fraction| fraction.abs() < CORNER || (fraction - 1.0).abs() < CORNER);
     // The last corner would be the centre of a picture of twice the size.
-    let problem = if is_corner && shares.iter().any(|share| share.abs() < CORNER) {
+    let problem = if is_corner && fractions.iter().any(|fraction| fraction.abs() < CORNER) {
         format!(
             "is in the corner of the picture of {}: is it missing, or counted from the centre?",
             times(size)
         )
     } else if let Some(problem) = other_picture(point, size) {
         problem
-    } else if shares.iter().any(|share| !(0.0..=1.0).contains(share)) {
+    } else if fractions.iter().any(|fraction| !(0.0..=1.0).contains(fraction)) {
         format!(
             "is outside of the picture of {}: check that the size is that of the calibration",
             times(size)
@@ -42,7 +43,7 @@ pub(super) fn doubt_of_other_picture(camera: &CameraSpec) -> Option<Doubt> {
 pub(super) fn far_doubt(camera: &CameraSpec) -> Option<Doubt> {
     let point = camera.principal_point_px?;
     let size = camera.size_px.map(f64::from);
-    shares(point, size).iter().any(|share| (share - 0.5).abs() > USUAL).then(|| {
+    fractions(point, size).iter().any(|fraction| (fraction - 0.5).abs() > USUAL).then(|| {
         let problem = format!(
             "is far from the centre of the picture of {}: check it, and that the size is that of the calibration",
             times(size)
@@ -52,7 +53,7 @@ pub(super) fn far_doubt(camera: &CameraSpec) -> Option<Doubt> {
 }
 
 /// Where a point lies along the sides; zero and one are the borders.
-fn shares(point: [f64; 2], size: [f64; 2]) -> [f64; 2] {
+fn fractions(point: [f64; 2], size: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|axis| (point[axis] + 0.5) / size[axis])
 }
 

@@ -130,12 +130,12 @@ fn ends(mut values: Vec<f32>) -> [f32; 2] {
     values.retain(|value| value.is_finite());
     values.sort_unstable_by(f32::total_cmp);
     let last = values.len().saturating_sub(1) as f32;
-    let at = |share: f32| values.get((share * last).round() as usize).copied();
+    let at = |fraction: f32| values.get((fraction * last).round() as usize).copied();
     [at(BEYOND).unwrap_or(0.0), at(1.0 - BEYOND).unwrap_or(1.0)]
 }
 
-fn turbo(share: f32) -> [u8; 3] {
-    let place = share.clamp(0.0, 1.0) * (TURBO.len() - 1) as f32;
+fn turbo(fraction: f32) -> [u8; 3] {
+    let place = fraction.clamp(0.0, 1.0) * (TURBO.len() - 1) as f32;
     let low = (place as usize).min(TURBO.len() - 2);
     let mix = |k: usize| {
         let [a, b] = [TURBO[low][k], TURBO[low + 1][k]].map(f32::from);

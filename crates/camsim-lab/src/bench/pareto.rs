@@ -10,7 +10,7 @@ use crate::timing::quantile;
 
 /// A row is slower if its time is larger by this factor ...
 const MIN_TIME_RATIO: f64 = 1.02;
-/// ... in this share of the rounds: of three rounds, in about all.
+/// ... in this fraction of the rounds: of three rounds, in about all.
 const SHARE_OF_ROUNDS: f64 = 0.9;
 /// Source errors differ if their ratio exceeds this factor ...
 const MIN_ERROR_RATIO: f64 = 1.1;

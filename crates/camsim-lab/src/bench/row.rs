@@ -51,8 +51,8 @@ pub struct Row {
     pub smooth_rms_px: Option<f64>,
     /// 99th percentile of the source error away from silhouettes, px, which `predicted_px` bounds.
     pub smooth_p99_px: Option<f64>,
-    /// Share of the compared pixels within 3 px of a silhouette.
-    pub edge_share: Option<f64>,
+    /// Fraction of the compared pixels within 3 px of a silhouette.
+    pub edge_fraction: Option<f64>,
     /// Numbers of pixels compared: coordinates, picture.
     pub compared: [u64; 2],
     /// Number of valid pixels that have no source in the reference.
@@ -108,7 +108,7 @@ impl Row {
         let smooth = Some(coords.smooth).filter(|smooth| smooth.count > 0);
         self.smooth_rms_px = smooth.map(|smooth| smooth.rms_px);
         self.smooth_p99_px = smooth.map(|smooth| smooth.p99_px);
-        self.edge_share = Some(coords.silhouettes.count as f64 / coords.all.count.max(1) as f64);
+        self.edge_fraction = Some(coords.silhouettes.count as f64 / coords.all.count.max(1) as f64);
         (self.falsely_valid, self.missing) = (coords.falsely_valid, coords.missing);
         self.compared[0] = coords.all.count;
     }

@@ -34,7 +34,7 @@ const COLUMNS: [(&str, fn(&Row) -> String); 24] = [
     ("edge_psnr_db", |row| number(row.edge_psnr_db)),
     ("smooth_rms_px", |row| number(row.smooth_rms_px)),
     ("smooth_p99_px", |row| number(row.smooth_p99_px)),
-    ("edge_share", |row| number(row.edge_share)),
+    ("edge_fraction", |row| number(row.edge_fraction)),
     ("falsely_valid", |row| row.falsely_valid.to_string()),
     ("missing", |row| row.missing.to_string()),
     ("coord_front", |row| row.coord_front.to_string()),
@@ -104,9 +104,9 @@ impl BenchReport {
                 format!("{least} to {most}")
             }),
         )?;
-        match first.edge_share.filter(|share| *share > 0.0) {
-            Some(share) => {
-                writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * share)?
+        match first.edge_fraction.filter(|fraction| *fraction > 0.0) {
+            Some(fraction) => {
+                writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * fraction)?
             }
             None => writeln!(text, ".\n")?,
         }

@@ -2,7 +2,7 @@
 //!
 //! Source coordinates are compared at every second pixel of every second row. Pictures are compared at random
 //! pixels, which the reference renderer refines with tens to hundreds of rays each. Near silhouettes the
-//! pixels are denser; the overall figure weights both kinds by their shares of the whole picture.
+//! pixels are denser; the overall figure weights both kinds by their fractions of the whole picture.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -99,12 +99,12 @@ impl Truth {
     pub fn picture_errors(&self, frame: &RenderedFrame) -> PictureErrors {
         let squares = self.squared_errors(frame);
         let mean = |kind: usize| squares[kind].0 / (3 * squares[kind].1.max(1)) as f64;
-        let share = self
+        let fraction = self
             .valid_pixels
             .map(|pixels| pixels as f64 / (self.valid_pixels[0] + self.valid_pixels[1]).max(1) as f64);
         let psnr_db = |mean_square: f64| (mean_square > 0.0).then(|| -10.0 * mean_square.log10());
         PictureErrors {
-            psnr_db: psnr_db(share[0] * mean(0) + share[1] * mean(1)),
+            psnr_db: psnr_db(fraction[0] * mean(0) + fraction[1] * mean(1)),
             edge_psnr_db: psnr_db(mean(1)),
             smooth_dn: (squares[0].1 > 0).then(|| 255.0 * mean(0).sqrt()),
             pixels: squares[0].1 + squares[1].1,

@@ -77,7 +77,7 @@ pub fn texture() -> Texture {
     Texture { size_px: SIZE_PX, rgba8, encoding: Encoding::Srgb }
 }
 
-/// Share of the pixel at (dx, dy) from a circle's centre that the circle covers, from 8 x 8 samples.
+/// Fraction of the pixel at (dx, dy) from a circle's centre that the circle covers, from 8 x 8 samples.
 fn coverage(dx: f64, dy: f64) -> f64 {
     let is_inside = |i: i32| {
         let [x, y] = [i % 8, i / 8].map(|k| (f64::from(k) + 0.5) / 8.0 - 0.5);

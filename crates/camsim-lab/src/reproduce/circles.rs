@@ -166,7 +166,7 @@ mod tests {
         let blobs = detect_blobs(&frame);
         assert_eq!(blobs.len(), 2, "the one at the border does not count: {blobs:?}");
         for (blob, (centre, radius)) in blobs.iter().zip(discs) {
-            // The picture itself, of 64 x 64 samples per pixel, is accurate to 1e-3. The covered share of a
+            // The picture itself, of 64 x 64 samples per pixel, is accurate to 1e-3. The covered fraction of a
             // rim pixel counts at the pixel's centre, which shifts these two centroids by 0.0017 and 0.0035
             // px.
             let area_px2 = std::f64::consts::PI * radius * radius;

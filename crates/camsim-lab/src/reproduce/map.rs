@@ -59,8 +59,8 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
 }
 
 /// Finds an instant of a left turn with much land in view: of the instants, one per second, whose yaw rate is
-/// at least half of the largest, the one with the largest share of land. Returns path time in seconds, and
-/// the share. The view along the nose always contains the horizon, and the terrain has a border.
+/// at least half of the largest, the one with the largest fraction of land. Returns path time in seconds, and
+/// the fraction. The view along the nose always contains the horizon, and the terrain has a border.
 fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError> {
     let (start_s, end_s) = sequence.path.span_s();
     let trajectory = &sequence.path.trajectory;
@@ -74,7 +74,7 @@ fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError
         (0..(end_s - start_s - 6.0).max(1.0) as u64).map(|i| (i, start_s + 3.0 + i as f64)).collect();
     let largest_rate = instants.iter().map(|(_, t_s)| left_yaw_rate(*t_s)).fold(f64::MIN, f64::max);
     let [width, height] = sequence.scenario.camera.size_px;
-    let land_share = |frame: u64| {
+    let land_fraction = |frame: u64| {
         let view = reference.view(frame);
         let step = (width / 32).max(1) as usize;
         let pixels = (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| [x, y]));
@@ -87,7 +87,7 @@ fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError
     let turns = instants
         .into_iter()
         .filter(|(_, t_s)| left_yaw_rate(*t_s) >= 0.5 * largest_rate)
-        .map(|(frame, t_s)| (t_s, land_share(frame)));
+        .map(|(frame, t_s)| (t_s, land_fraction(frame)));
     Ok(turns.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((start_s, 0.0)))
 }
 

@@ -140,12 +140,12 @@ pub(super) fn measure(
 fn shape_row(bench: &Sequence, result: &ShutterResult, table: &mut Table) -> Result<(), ReproduceError> {
     let (camera, _) = test_bench::camera_and_shutter(bench)?;
     let rate_px_s = camera.focal_px.y * FLIGHT_M_S / HEIGHT_M;
-    let share = rate_px_s * READOUT_S / f64::from(camera.size_px[1]);
+    let fraction = rate_px_s * READOUT_S / f64::from(camera.size_px[1]);
     // Flight to the right: the image moves left, lower rows later. Upwards: it moves down. Downwards: up.
     let (what, k, closed) = match result.motion {
-        "to the right" => ("shear, px of x for one of y", [0, 1], -share),
-        "upwards" => ("height, relative", [1, 1], 1.0 / (1.0 - share)),
-        "downwards" => ("height, relative", [1, 1], 1.0 / (1.0 + share)),
+        "to the right" => ("shear, px of x for one of y", [0, 1], -fraction),
+        "upwards" => ("height, relative", [1, 1], 1.0 / (1.0 - fraction)),
+        "downwards" => ("height, relative", [1, 1], 1.0 / (1.0 + fraction)),
         _ => return Ok(()),
     };
     let mut global = bench.clone();

@@ -270,15 +270,15 @@ pub fn reference(sequence: &Arc<Sequence>) -> Result<Oracle, ReproduceError> {
 pub fn count_wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Result<usize, ReproduceError> {
     let reference = reference(sequence)?;
     let [width, _] = frame.size_px;
-    // The sky is blue, the target grey. A border pixel with similar shares of both is right either way.
-    let sky_share = |pixel: &[f32]| (pixel[2] - pixel[0]) / (SKY_LINEAR[2] - SKY_LINEAR[0]);
+    // The sky is blue, the target grey. A border pixel with similar fractions of both is right either way.
+    let sky_fraction = |pixel: &[f32]| (pixel[2] - pixel[0]) / (SKY_LINEAR[2] - SKY_LINEAR[0]);
     let view = reference.view(0);
     let wrong = frame.color_rgba().par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
         let position = [*i as u32 % width, *i as u32 / width];
         let sample = view.sample(position, DVec2::ZERO, 0.0);
         sample.is_some_and(|sample| {
             pixel[3] > 0.0
-                && if sample.hit.is_some() { sky_share(pixel) > 0.75 } else { sky_share(pixel) < 0.25 }
+                && if sample.hit.is_some() { sky_fraction(pixel) > 0.75 } else { sky_fraction(pixel) < 0.25 }
         })
     });
     Ok(wrong.count())

@@ -277,11 +277,11 @@ impl<'a> FrameContext<'a> {
         };
         let sources = ExactSources::of_silhouettes(reach, dry_run);
         let own = self.neighbourhoods(self.frame, reach);
-        let least_share = sources.share_apart(|probe| own.of_probes[probe].near_silhouette);
+        let least_fraction = sources.fraction_apart(|probe| own.of_probes[probe].near_silhouette);
         let plane = sources.plane();
         let disocclusion = sources.disocclusion(&[self.key()], quality.max_error_px);
         let model = |all: &Neighbourhoods| {
-            SilhouetteModel::new(all, &reach.camera, key_pose, &plane, disocclusion, least_share)
+            SilhouetteModel::new(all, &reach.camera, key_pose, &plane, disocclusion, least_fraction)
         };
         if !self.has_fewer_probes {
             return Some(model(&own));

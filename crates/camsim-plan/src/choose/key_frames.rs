@@ -5,7 +5,7 @@ use camsim_core::{mount::CameraPath, scenario::QualitySpec, temporal::IdealGeome
 
 use super::edges::FINE_PIXEL_BYTES;
 use crate::ir::{
-    budget::{ErrorBudget, NEARLY, disoccluded_share},
+    budget::{ErrorBudget, NEARLY, disoccluded_fraction},
     key_frame::KeyFrame,
     limits::{MAX_IDEAL_PX, MAX_KEYS, SIZE_QUANTUM_PX},
     predicted::Disocclusion,
@@ -65,18 +65,18 @@ pub(crate) fn wanted(
     if for_blended > 1 {
         return for_blended.min(MAX_KEYS);
     }
-    let Some(Disocclusion { share, width_px, wide_share, error_dn, .. }) = disocclusion else {
+    let Some(Disocclusion { fraction, width_px, wide_fraction, error_dn, .. }) = disocclusion else {
         return one("no silhouette has rays of its own".into());
     };
-    if *error_dn > ErrorBudget::new(quality).disocclusion_dn() || *wide_share > disoccluded_share() {
+    if *error_dn > ErrorBudget::new(quality).disocclusion_dn() || *wide_fraction > disoccluded_fraction() {
         return 2;
     }
-    if *share == 0.0 {
+    if *fraction == 0.0 {
         return one("no disocclusion was found behind silhouettes".into());
     }
     one(format!(
         "disocclusion in {:.4} % of the picture, {width_px:.2} px wide, costs {error_dn:.2}/255 over the picture",
-        100.0 * share
+        100.0 * fraction
     ))
 }
 

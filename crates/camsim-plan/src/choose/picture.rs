@@ -96,12 +96,12 @@ pub(crate) fn choose(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Pict
     let most_error_dn = ErrorBudget::new(quality).sampling_dn(&context.inputs.sequence.scene);
     let task = SamplingTask {
         quality,
-        max_error_dn: most_error_dn * context.request.share_of_dn,
+        max_error_dn: most_error_dn * context.request.fraction_of_dn,
         most_error_dn,
         least_scale: context.reach.least_scale(),
         wished_scale: if light.is_some_and(|light| light.shadows) { SHADOW_SCALE } else { 1.0 },
         most_scale: scale_of(context, scene, context.inputs.max_ideal_px, context.inputs.max_side_px),
-        ideal_share: ideal_share(context, scene),
+        ideal_fraction: ideal_fraction(context, scene),
         may_have_samples: false,
         is_drawing_cheap: context.inputs.is_drawing_cheap,
         exposure: context.exposed(scene.motion, &scene.ideal).path(quality, &mut Vec::new()),
@@ -125,7 +125,7 @@ fn scale_of(context: &FrameContext<'_>, scene: &FrameScene<'_>, pixels: u64, sid
 }
 
 /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
-fn ideal_share(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> f64 {
+fn ideal_fraction(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> f64 {
     let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
     let frames = context.shared.map_or(1.0, |shared| shared.count() as f64);
     let reach = &context.reach;
@@ -167,7 +167,8 @@ impl SilhouetteSearch<'_> {
         let Self { scene, task, model, .. } = self;
         let plain = self.plain();
         let fewest = self.ray_count(task.least_scale, &RayKind::FEWEST);
-        let rays_ms = scene.prices().rays_ms(model.share, task.least_scale, 1, fewest, task.ideal_share);
+        let rays_ms =
+            scene.prices().rays_ms(model.fraction, task.least_scale, 1, fewest, task.ideal_fraction);
         if plain.within && plain.price.ms < rays_ms {
             return (plain, None);
         }
@@ -262,7 +263,7 @@ impl SilhouetteSearch<'_> {
         let choice = SamplingSearch { prices, task, others_dn: &others_dn }.choose();
         let scale = choice.plan.scale;
         let rays_ms =
-            prices.rays_ms(model.share, scale, fine, self.ray_count(scale, &kind), task.ideal_share);
+            prices.rays_ms(model.fraction, scale, fine, self.ray_count(scale, &kind), task.ideal_fraction);
         SamplingChoice { price: choice.price.with_rays(rays_ms), ..choice }
     }
 }

@@ -125,8 +125,8 @@ pub(crate) struct Prices<'a> {
 
 impl Prices<'_> {
     /// Price of a plan, with so many pixels drawn of the ideal frame at scale 1 for each of the camera's.
-    pub fn price(&self, sampling: &SamplingPlan, blur: Option<BlurStage>, ideal_share: f64) -> Price {
-        let ideal_ms = self.ideal_ms(sampling, ideal_share);
+    pub fn price(&self, sampling: &SamplingPlan, blur: Option<BlurStage>, ideal_fraction: f64) -> Price {
+        let ideal_ms = self.ideal_ms(sampling, ideal_fraction);
         Price { ms: ideal_ms + self.read_ms(sampling.scale, sampling.taps, blur), ideal_ms }
     }
 
@@ -134,11 +134,11 @@ impl Prices<'_> {
     pub fn ideal_ms(
         &self,
         &SamplingPlan { scale, surface_reads, samples_a_pixel, .. }: &SamplingPlan,
-        ideal_share: f64,
+        ideal_fraction: f64,
     ) -> f64 {
         let a_px = self.mean(|probe| surface_ms(probe.texel_from_key * scale.recip(), surface_reads));
         let samples_ms = if samples_a_pixel > 1 { self.triangles.samples_ms(scale) } else { 0.0 };
-        ideal_share * (self.triangles.ms(scale) + scale * scale * a_px + samples_ms)
+        ideal_fraction * (self.triangles.ms(scale) + scale * scale * a_px + samples_ms)
     }
 
     /// Time of reading the ideal frame.
@@ -153,13 +153,13 @@ impl Prices<'_> {
         any_ms + finer_ms * (scale - 1.0) + self.mean(probe_ms)
     }
 
-    /// Time of giving pixels at silhouettes, which have a share of the picture, rays of their own: with so
+    /// Time of giving pixels at silhouettes, which have a fraction of the picture, rays of their own: with so
     /// many fine pixels along a side of each ideal one, all triangles drawn once more.
-    pub fn rays_ms(&self, share: f64, scale: f64, fine: u32, rays: u32, ideal_share: f64) -> f64 {
+    pub fn rays_ms(&self, fraction: f64, scale: f64, fine: u32, rays: u32, ideal_fraction: f64) -> f64 {
         let finer = scale * f64::from(fine);
         let [least_ms, coarse_ms] = RAYS_MS;
-        ideal_share * (ON_GPU * self.triangles.ms(finer) + finer * finer * MARKS_MS)
-            + share * f64::from(rays) * (least_ms + coarse_ms / finer)
+        ideal_fraction * (ON_GPU * self.triangles.ms(finer) + finer * finer * MARKS_MS)
+            + fraction * f64::from(rays) * (least_ms + coarse_ms / finer)
     }
 
     /// Mean over the texture probes.

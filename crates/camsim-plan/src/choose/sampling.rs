@@ -66,7 +66,7 @@ pub(crate) struct SamplingTask<'a> {
     /// Scale of the ideal frame that is too fine already.
     pub most_scale: f64,
     /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
-    pub ideal_share: f64,
+    pub ideal_fraction: f64,
     /// Whether ideal pixels may have several samples.
     pub may_have_samples: bool,
     /// Whether fine sampling costs less time than the search for the cheapest.
@@ -172,7 +172,7 @@ impl SamplingSearch<'_> {
         let blur = unbounded_blur_stage(plan, task.quality, task.exposure);
         let expected = prices.probes.expected(plan, blur);
         let total_dn = expected.total_dn().hypot(others_dn(plan, blur).unwrap_or(f64::INFINITY));
-        let price = prices.price(plan, blur, task.ideal_share);
+        let price = prices.price(plan, blur, task.ideal_fraction);
         let within = total_dn <= task.most_error_dn;
         SamplingChoice {
             plan: SamplingPlan { expected, ..*plan },
@@ -185,7 +185,7 @@ impl SamplingSearch<'_> {
 
     fn choice(&self, plan: SamplingPlan, total_dn: f64, within: bool, least_dn: f64) -> SamplingChoice {
         let blur = unbounded_blur_stage(&plan, self.task.quality, self.task.exposure);
-        let price = self.prices.price(&plan, blur, self.task.ideal_share);
+        let price = self.prices.price(&plan, blur, self.task.ideal_fraction);
         SamplingChoice { plan, price, total_dn, within, least_dn: least_dn.min(total_dn) }
     }
 
@@ -215,7 +215,7 @@ impl SamplingSearch<'_> {
                 .into_iter()
                 .flat_map(|reads| task.samples().iter().map(move |&samples| (reads, samples)))
                 .map(|(reads, samples)| SamplingPlan::of_ideal(scale, reads, samples))
-                .map(|ideal| (prices.ideal_ms(&ideal, task.ideal_share), ideal))
+                .map(|ideal| (prices.ideal_ms(&ideal, task.ideal_fraction), ideal))
                 .collect();
             for taps in self.tap_stages(scale) {
                 let read_ms =
@@ -275,7 +275,7 @@ impl SamplingSearch<'_> {
         };
         let worth_ms = |samples: f64, dn: f64| {
             let (plan, blur) = task.sampled(plan, samples);
-            task.worth_ms(prices.price(&plan, blur, task.ideal_share).ms, dn)
+            task.worth_ms(prices.price(&plan, blur, task.ideal_fraction).ms, dn)
         };
         // Fewer samples leave no less than the most.
         let cheaper = fewer.partition_point(|&samples| worth_ms(samples, total_dn) < below_ms);

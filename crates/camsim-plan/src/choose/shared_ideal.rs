@@ -23,13 +23,13 @@ impl SharedIdeal {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SamplingRequest {
     /// Part of `quality.max_error_dn` that it is to keep.
-    pub share_of_dn: f64,
+    pub fraction_of_dn: f64,
     /// The plan itself; `None` as long as that is to be found.
     pub given: Option<SamplingPlan>,
 }
 
 impl Default for SamplingRequest {
     fn default() -> Self {
-        Self { share_of_dn: 1.0, given: None }
+        Self { fraction_of_dn: 1.0, given: None }
     }
 }

@@ -69,7 +69,7 @@ impl FrameGroup {
             let own = FrameContext::as_in_group(inputs, middle)
                 .and_then(|context| plan_frame(&context, &context.scene()));
             if let Some(own) = own.ok().filter(|own| !own.edges.has_rays()) {
-                plans = Sharing { inputs, plan_frame, own: &own }.share(frames);
+                plans = Sharing { inputs, plan_frame, own: &own }.fraction(frames);
             }
         }
         Self { first, plans }
@@ -103,7 +103,7 @@ struct Sharing<'a> {
 impl Sharing<'_> {
     /// Plans of `frames` from one ideal frame, or from those of its halves, whichever takes less time; `None`
     /// for those that do not share.
-    fn share(&self, frames: Range<u64>) -> Vec<Option<FramePlan>> {
+    fn fraction(&self, frames: Range<u64>) -> Vec<Option<FramePlan>> {
         let own = self.own;
         let count = (frames.end - frames.start) as usize;
         let whole: Option<Vec<_>> =
@@ -120,11 +120,11 @@ impl Sharing<'_> {
             return whole.unwrap_or_else(|| vec![None; count]);
         }
         let middle = frames.start + half;
-        let mut halves = self.share(frames.start..middle);
+        let mut halves = self.fraction(frames.start..middle);
         // What the first half cannot do the second hardly can, unless it is far away.
         let is_worth_a_try = halves.iter().any(Option::is_some) || half >= FAR;
         halves.extend(if is_worth_a_try {
-            self.share(middle..frames.end)
+            self.fraction(middle..frames.end)
         } else {
             vec![None; count - halves.len()]
         });
@@ -142,10 +142,10 @@ impl Sharing<'_> {
         candidates.scene_of(frames.end - 1, None)?;
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
         let mut coarsest = frames.start;
-        for share_of_dn in GROUP_SHARES {
+        for fraction_of_dn in GROUP_SHARES {
             // What is dearer than frames by themselves already is no cheaper with its solver.
             let picture = candidates
-                .picture(coarsest, share_of_dn)
+                .picture(coarsest, fraction_of_dn)
                 .filter(|picture| is_worth_it(picture.price.ms, 1))?;
             let sampling = picture.plan;
             candidates.scene_of(frames.end - 1, Some(sampling))?;
@@ -234,9 +234,9 @@ impl<'a> SharingCandidates<'a> {
 
     /// How a frame's picture would be made from the shared ideal frame, sampled as it needs for a part of
     /// `quality.max_error_dn`.
-    fn picture(&self, frame: u64, share_of_dn: f64) -> Option<PictureChoice> {
+    fn picture(&self, frame: u64, fraction_of_dn: f64) -> Option<PictureChoice> {
         let (context, scene) = self.scene_of(frame, None)?;
-        Some(picture::choose(&context.requesting(SamplingRequest { share_of_dn, given: None }), scene))
+        Some(picture::choose(&context.requesting(SamplingRequest { fraction_of_dn, given: None }), scene))
     }
 
     /// The plan of a frame that is sampled so.

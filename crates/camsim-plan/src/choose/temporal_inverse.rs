@@ -55,8 +55,9 @@ pub(crate) fn choose<'a>(task: &TemporalTask<'a>, motion: &Motion) -> TemporalCh
     };
     let mut predicted = search.predict(method);
     if task.silhouettes_in_view {
-        predicted.silhouette_share =
-            task.silhouettes.map_or_else(|| sources.silhouette_share(), |silhouettes| silhouettes.share);
+        predicted.silhouette_fraction = task
+            .silhouettes
+            .map_or_else(|| sources.silhouette_fraction(), |silhouettes| silhouettes.fraction);
     }
     let missed_px = missed_px(task, &predicted);
     TemporalChoice { method, terrain_tolerance_px, predicted, missed_px, sources }
@@ -192,7 +193,7 @@ impl TemporalSearch<'_, '_> {
             terrain: self.terrain,
             silhouettes: task.silhouettes,
             blended_depth: task.blended,
-            void_share: 1.0 - probes as f64 / tried.max(1) as f64,
+            void_fraction: 1.0 - probes as f64 / tried.max(1) as f64,
             probes: probes as u32,
             ..Predicted::default()
         };
@@ -202,8 +203,8 @@ impl TemporalSearch<'_, '_> {
     /// With whether the source error is kept, and if not, by what.
     fn judged(&self, predicted: Predicted, method: TemporalMethod) -> Predicted {
         let max_error_px = self.task.sequence.scenario.quality.max_error_px;
-        let void_share = predicted.void_share;
-        let covered = predicted.probes > 0 && void_share <= MAX_VOID_SHARE;
+        let void_fraction = predicted.void_fraction;
+        let covered = predicted.probes > 0 && void_fraction <= MAX_VOID_SHARE;
         let kept = predicted.total_px <= max_error_px && covered;
         let most = method.blur.is_some_and(|blur| blur.solved() > MOST_STEPS);
         let obstacle = match (kept, covered) {
@@ -211,7 +212,7 @@ impl TemporalSearch<'_, '_> {
             (false, true) => largest_cause(&predicted, most),
             (false, false) => Some(format!(
                 "the ideal frame: {:.1} % of the pixels see what lies outside of it",
-                100.0 * void_share
+                100.0 * void_fraction
             )),
         };
         Predicted { source_error_kept: kept, source_error_obstacle: obstacle, ..predicted }

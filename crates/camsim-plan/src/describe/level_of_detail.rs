@@ -20,8 +20,8 @@ pub struct LevelOfDetail {
     pub max_error_px: f64,
     /// What is allowed of it.
     pub tolerance_px: f64,
-    /// Bound on the depth error seen from straight above, as a share of the depth.
-    pub depth_share: f64,
+    /// Bound on the depth error seen from straight above, as a fraction of the depth.
+    pub depth_fraction: f64,
     /// GPU memory of the triangles, bytes.
     pub triangle_bytes: u64,
 }
@@ -41,7 +41,7 @@ impl LevelOfDetail {
             away: lod.back_facing,
             max_error_px: lod.max_error_px / scale,
             tolerance_px: plan.terrain_error_px / scale,
-            depth_share: plan.terrain_error_px / plan.ideal.focal_px.max_element(),
+            depth_fraction: plan.terrain_error_px / plan.ideal.focal_px.max_element(),
             triangle_bytes: placed.bytes(),
         })
     }

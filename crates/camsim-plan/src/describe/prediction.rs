@@ -23,7 +23,7 @@ fn verdict(kept: bool) -> &'static str {
 
 /// By cause, the largest first.
 fn write_source_error(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let Predicted { total_px, probes, silhouette_share, level_of_detail_px, .. } = *predicted;
+    let Predicted { total_px, probes, silhouette_fraction, level_of_detail_px, .. } = *predicted;
     let verdict = verdict(predicted.source_error_kept);
     writeln!(f, "  99 % of the pixels: at most {total_px:.2e}, from dry runs of {probes} pixels: {verdict}")?;
     if let Some(cause) = &predicted.source_error_obstacle {
@@ -45,24 +45,24 @@ fn write_source_error(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt:
     for (px, cause, more) in causes.into_iter().filter(|cause| cause.0 > 0.0) {
         writeln!(f, "  {px:.2e} {cause}{more}")?;
     }
-    if silhouette_share > 0.0 {
+    if silhouette_fraction > 0.0 {
         writeln!(
             f,
             "  not counted: at least {:.0} % of the pixels, at silhouettes or creases",
-            100.0 * silhouette_share
+            100.0 * silhouette_fraction
         )?;
     }
-    let Some(Disocclusion { share, width_px, .. }) = predicted.disocclusion else { return Ok(()) };
+    let Some(Disocclusion { fraction, width_px, .. }) = predicted.disocclusion else { return Ok(()) };
     let of_one = predicted
         .disocclusion_of_one_key
         .filter(|_| predicted.disocclusion != predicted.disocclusion_of_one_key);
     let beside = of_one.map_or_else(String::new, |one| {
-        format!(" (of a single one {:.4} %, {:.2} px)", 100.0 * one.share, one.width_px)
+        format!(" (of a single one {:.4} %, {:.2} px)", 100.0 * one.fraction, one.width_px)
     });
-    let share = 100.0 * share;
+    let fraction = 100.0 * fraction;
     writeln!(
         f,
-        "  disocclusion: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}"
+        "  disocclusion: {fraction:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}"
     )
 }
 
@@ -75,10 +75,10 @@ fn write_picture_error(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt
         .silhouettes
         .map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
     let blended =
-        predicted.blended_depth.map_or_else(String::new, |BlendedDepthError { share, error_dn }| {
+        predicted.blended_depth.map_or_else(String::new, |BlendedDepthError { fraction, error_dn }| {
             format!(
                 ", {error_dn:.2} by the one depth of blended surfaces ({:.0} % of the picture)",
-                100.0 * share
+                100.0 * fraction
             )
         });
     writeln!(

@@ -40,7 +40,7 @@ pub(crate) const GROUP_SHARES: [f64; 3] = [0.95, 1.0, 0.85];
 
 /// Part of either tolerance that disocclusion may take.
 const DISOCCLUSION: f64 = 0.5;
-/// Share of the pixels in which `quality.max_error_px` is kept.
+/// Fraction of the pixels in which `quality.max_error_px` is kept.
 const PERCENTILE: f64 = 0.99;
 
 /// Where nothing keeps a tolerance: times the least error there is.
@@ -123,8 +123,8 @@ pub(crate) fn terrain_dn(misregistration_dn: f64) -> f64 {
     TERRAIN_OF_DN * misregistration_dn
 }
 
-/// Share of the picture that may be disoccluded in strips wider than `quality.max_error_px`.
-pub(crate) fn disoccluded_share() -> f64 {
+/// Fraction of the picture that may be disoccluded in strips wider than `quality.max_error_px`.
+pub(crate) fn disoccluded_fraction() -> f64 {
     DISOCCLUSION * (1.0 - PERCENTILE)
 }
 

@@ -111,7 +111,7 @@ pub struct FramePlan {
     /// Time that its passes are expected to take, roughly: milliseconds for pictures of 640x480 on two
     /// processor cores with llvmpipe, whatever machine this is. Plans are compared by it.
     pub price_ms: f64,
-    /// Part of `price_ms` that this frame's share of the ideal frame takes.
+    /// Part of `price_ms` that this frame's fraction of the ideal frame takes.
     pub ideal_price_ms: f64,
     /// The colour that its output pass makes, of a camera whose colours have a lens each; plans are those of green.
     pub primary: Option<Primary>,
@@ -213,7 +213,7 @@ impl FramePlan {
 
     /// How much of the frame's window has gone by at an instant, path time, seconds: 0 to 1 within it.
     #[must_use]
-    pub fn window_share(&self, t_s: f64) -> f64 {
+    pub fn window_fraction(&self, t_s: f64) -> f64 {
         let [first_s, last_s] = self.window_s;
         if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 }
     }

@@ -39,12 +39,12 @@ pub struct Predicted {
     pub picture_error_obstacle: Option<String>,
     /// Source error by all causes: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the pixels that are counted apart: at a silhouette or disoccluded. To within some hundredths,
+    /// Fraction of the pixels that are counted apart: at a silhouette or disoccluded. To within some hundredths,
     /// and too low where folds of depth lie between the nine rays that look for them.
-    pub silhouette_share: f64,
-    /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame
+    pub silhouette_fraction: f64,
+    /// Fraction of the probes that have a ray but no source: what they see lies outside of the ideal frame
     /// ([`SourceError::NoSource`](super::error_map::SourceError::NoSource)).
-    pub void_share: f64,
+    pub void_fraction: f64,
     /// Disocclusion with the plan's key frames; `None` where it is not looked for.
     pub disocclusion: Option<Disocclusion>,
     /// Disocclusion with a single key frame; `None` where it is not looked for.
@@ -81,12 +81,12 @@ impl Predicted {
 /// Picture error at silhouettes, as they are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SilhouetteError {
-    /// Share of the pixels within 3 px of one, folds of depth included.
-    pub share: f64,
+    /// Fraction of the pixels within 3 px of one, folds of depth included.
+    pub fraction: f64,
     /// RMS contrast across them, 1/255 of the linear range.
     pub contrast_dn: f64,
-    /// Share of the picture that the ideal frame's camera does not see behind them.
-    pub disoccluded_share: f64,
+    /// Fraction of the picture that the ideal frame's camera does not see behind them.
+    pub disoccluded_fraction: f64,
     /// RMS error of the pixels within 3 px of them, 1/255 of the linear range.
     pub at_silhouettes_dn: f64,
     /// RMS error over the picture by them, 1/255 of the linear range.
@@ -96,14 +96,14 @@ pub struct SilhouetteError {
 /// Scene that pixels see and the ideal frames of a plan do not show, as the probes find it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Disocclusion {
-    /// Share of the picture, over its area and exposure.
-    pub share: f64,
+    /// Fraction of the picture, over its area and exposure.
+    pub fraction: f64,
     /// Width of the strips, the mean over that share, pixels of the ideal frame.
     pub width_px: f64,
-    /// Share of the picture in strips wider than `quality.max_error_px`.
-    pub wide_share: f64,
-    /// Share of the picture, where a strip narrower than a pixel counts as much less.
-    pub weighted_share: f64,
+    /// Fraction of the picture in strips wider than `quality.max_error_px`.
+    pub wide_fraction: f64,
+    /// Fraction of the picture, where a strip narrower than a pixel counts as much less.
+    pub weighted_fraction: f64,
     /// Expected error, RMS over the picture, 1/255 of the linear range. A strip narrower than a pixel is as
     /// much less of each that it crosses.
     pub error_dn: f64,
@@ -112,8 +112,8 @@ pub struct Disocclusion {
 /// Picture error by the one depth that light of several blended surfaces has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BlendedDepthError {
-    /// Share of the pixels that show blended surfaces.
-    pub share: f64,
+    /// Fraction of the pixels that show blended surfaces.
+    pub fraction: f64,
     /// RMS error over the picture, 1/255 of the linear range.
     pub error_dn: f64,
 }

@@ -13,7 +13,7 @@ use super::frame_plan::FramePlan;
 /// Relative poses `x_key = R x_row + t` of a frame: `[key][field][row][node]`, each three rows of `(R, t)`;
 /// with more than one node the mid-exposure pose follows the nodes. Of frames whose ideal frames are not the
 /// mid-window camera's the poses `x_mid = R x_key + t` of the keys in that camera follow, and of frames with
-/// several keys then an entry for each field and row with the row's mid-exposure and exposure time as shares of
+/// several keys then an entry for each field and row with the row's mid-exposure and exposure time as fractions of
 /// the window in its first two numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowPoses {
@@ -51,15 +51,15 @@ pub fn row_poses(plan: &FramePlan, path: &CameraPath) -> RowPoses {
     }
     if plan.keys.len() > 1 {
         entries.extend(rows_of(plan).map(|(field, row)| {
-            let share = plan.window_share(plan.stamp_s + row_dt_s(plan, field, row));
-            [[share as f32, exposure_share(plan, row) as f32, 0.0, 0.0], [0.0; 4], [0.0; 4]]
+            let fraction = plan.window_fraction(plan.stamp_s + row_dt_s(plan, field, row));
+            [[fraction as f32, exposure_fraction(plan, row) as f32, 0.0, 0.0], [0.0; 4], [0.0; 4]]
         }));
     }
     RowPoses { entries, stride }
 }
 
-/// Exposure of a row as a share of the window.
-fn exposure_share(plan: &FramePlan, row: u32) -> f64 {
+/// Exposure of a row as a fraction of the window.
+fn exposure_fraction(plan: &FramePlan, row: u32) -> f64 {
     plan.shutter.exposure_row_s(row) / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)
 }
 

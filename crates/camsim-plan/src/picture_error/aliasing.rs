@@ -1,6 +1,6 @@
 //! Aliasing: what is left of the stair-steps of a border by what reads the ideal frame.
 //!
-//! The ideal frame shows one surface or the other in each of its pixels; the exact pixel has its share of
+//! The ideal frame shows one surface or the other in each of its pixels; the exact pixel has its fraction of
 //! both. How far apart the two are depends on what reads the ideal frame: reads all over a pixel's area mend
 //! stairs, one bilinear read of a frame three times as fine hardly does.
 //!

@@ -58,9 +58,9 @@ impl BlendSearch<'_> {
         let squares = squares.as_flattened();
         let count = squares.len().max(1) as f64;
         let mixed = squares.iter().flatten();
-        let share = mixed.clone().count() as f64 / count;
+        let fraction = mixed.clone().count() as f64 / count;
         Some(BlendedDepthError {
-            share,
+            fraction,
             error_dn: margins::BLENDED_DEPTH * 255.0 * (mixed.sum::<f64>() / count).sqrt(),
         })
     }

@@ -3,9 +3,9 @@
 //!
 //! Two things go wrong. The silhouette runs along whole pixels, so that pixels on it have too much of one
 //! surface: aliasing. And within the parallax between the two surfaces a pixel looks where the other one is.
-//! Both are a share of the contrast across the silhouette. The neighbourhoods of the probes show how wide the
+//! Both are a fraction of the contrast across the silhouette. The neighbourhoods of the probes show how wide the
 //! strip within parallax is; a few silhouettes have most of it, at which hardly any probe stands, so that the
-//! share of the picture that is disoccluded (`disocclusion.rs`) counts too.
+//! fraction of the picture that is disoccluded (`disocclusion.rs`) counts too.
 //!
 //! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of
 //! its pixels where the silhouette is. Where meshes of other colours touch, rays change nothing: only a finer
@@ -41,10 +41,10 @@ const LEAST_LEFT_BY_SAMPLES: f64 = 0.02;
 /// the picture, in pixels, contrasts of the linear range.
 #[derive(Clone, Debug)]
 pub(crate) struct SilhouetteModel {
-    /// Share of the pixels at silhouettes.
-    pub share: f64,
+    /// Fraction of the pixels at silhouettes.
+    pub fraction: f64,
     contrast_dn: f64,
-    disoccluded_share: f64,
+    disoccluded_fraction: f64,
     /// Mean squared error over the picture by strips within parallax.
     strips: f64,
     /// Squared contrast of silhouettes times their length.
@@ -72,7 +72,7 @@ impl SilhouetteModel {
         key_pose: &CameraPose,
         plane: &SeenPlane,
         disocclusion: Disocclusion,
-        least_share: f64,
+        least_fraction: f64,
     ) -> Self {
         let near = NearProbes::new(of_probes);
         let contrast2 = near.mean(|silhouette| silhouette.contrast2);
@@ -90,16 +90,17 @@ impl SilhouetteModel {
             if skyline_steps.is_some() { silhouette.steps_between_surfaces } else { silhouette.steps() }
         };
         let skyline_steps = margins::SILHOUETTES * margins::SILHOUETTES * skyline_steps.unwrap_or(0.0);
-        let of_points =
-            margins::SILHOUETTES * margins::SILHOUETTES * near.share * near.mean(at_probes) + skyline_steps;
+        let of_points = margins::SILHOUETTES * margins::SILHOUETTES * near.fraction * near.mean(at_probes)
+            + skyline_steps;
         let of_lines = over_all(&|crossings| crossings.steps);
         let (density, uncertainty) = (density(of_probes), uncertainty(of_probes));
         Self {
-            share: near.share.max(least_share),
+            fraction: near.fraction.max(least_fraction),
             contrast_dn: 255.0 * contrast2.sqrt(),
-            disoccluded_share: disocclusion.share,
-            strips: STRIPS * near.contrast2_between_surfaces() * disocclusion.weighted_share
-                + near.share * near.mean(|silhouette| silhouette.strip(key_pose, camera.central_focal_px()))
+            disoccluded_fraction: disocclusion.fraction,
+            strips: STRIPS * near.contrast2_between_surfaces() * disocclusion.weighted_fraction
+                + near.fraction
+                    * near.mean(|silhouette| silhouette.strip(key_pose, camera.central_focal_px()))
                 + skyline.strips(key_pose, plane),
             steps: uncertainty * (of_points.max(density * of_lines) - skyline_steps) + skyline_steps,
             steps_at_pixel_spacing: of_points.max(of_lines / density),
@@ -139,11 +140,11 @@ impl SilhouetteModel {
 
     /// Of a mean squared error over the picture.
     fn error(&self, square: f64) -> SilhouetteError {
-        let Self { share, contrast_dn, disoccluded_share, .. } = *self;
+        let Self { fraction, contrast_dn, disoccluded_fraction, .. } = *self;
         // Of no silhouettes at all the sum is -0.
         let error_dn = 255.0 * square.abs().sqrt();
-        let at_silhouettes_dn = if share > 0.0 { error_dn / share.sqrt() } else { 0.0 };
-        SilhouetteError { share, contrast_dn, disoccluded_share, at_silhouettes_dn, error_dn }
+        let at_silhouettes_dn = if fraction > 0.0 { error_dn / fraction.sqrt() } else { 0.0 };
+        SilhouetteError { fraction, contrast_dn, disoccluded_fraction, at_silhouettes_dn, error_dn }
     }
 }
 
@@ -151,14 +152,14 @@ impl SilhouetteModel {
 struct NearProbes<'a> {
     probes: Vec<&'a SilhouetteProbe>,
     /// Of all probes.
-    share: f64,
+    fraction: f64,
 }
 
 impl<'a> NearProbes<'a> {
     fn new(of_probes: &'a [Neighbourhood]) -> Self {
         let probes: Vec<_> = of_probes.iter().filter_map(|near| near.silhouette.as_ref()).collect();
-        let share = probes.len() as f64 / of_probes.len().max(1) as f64;
-        Self { probes, share }
+        let fraction = probes.len() as f64 / of_probes.len().max(1) as f64;
+        Self { probes, fraction }
     }
 
     fn mean(&self, of_probe: impl Fn(&SilhouetteProbe) -> f64) -> f64 {

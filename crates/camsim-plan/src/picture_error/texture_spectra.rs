@@ -146,9 +146,9 @@ impl TextureSpectrum {
         let places = places(detail);
         for _ in 0..ROUNDS {
             let mut modelled = vec![0.0; detail];
-            for (frequency, area, shares) in &places {
+            for (frequency, area, fractions) in &places {
                 let power = spectrum.density(*frequency) * area;
-                modelled.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share * power);
+                modelled.iter_mut().zip(fractions).for_each(|(sum, fraction)| *sum += fraction * power);
             }
             for ((log_density, wanted), modelled) in spectrum.log_density.iter_mut().zip(lost).zip(modelled) {
                 *log_density += 0.7 * (wanted.max(1e-12) / modelled.max(1e-300)).ln();
@@ -186,7 +186,7 @@ fn mean(losses: [Vec<f64>; BEGINNINGS.len()]) -> Vec<f64> {
         .collect()
 }
 
-/// Frequencies of a quadrant, the area that each stands for in all four, and the share of its power that goes
+/// Frequencies of a quadrant, the area that each stands for in all four, and the fraction of its power that goes
 /// with each level.
 fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
     let octaves = levels as u32 + 2;

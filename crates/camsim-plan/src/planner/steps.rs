@@ -34,7 +34,7 @@ use crate::{
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
 
-/// Rays over a pixel at a shadow's border. On a lattice of a Fibonacci number of points the share of them on
+/// Rays over a pixel at a shadow's border. On a lattice of a Fibonacci number of points the fraction of them on
 /// one side of a straight line is within 0.05 of the area's.
 const SHADOW_BORDER_RAYS: u32 = 21;
 

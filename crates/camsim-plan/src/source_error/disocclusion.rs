@@ -1,4 +1,4 @@
-//! Disocclusion: what a pixel's ray meets and no ideal frame shows, since something stands between. Its share
+//! Disocclusion: what a pixel's ray meets and no ideal frame shows, since something stands between. Its fraction
 //! of the picture decides whether a second ideal frame is worth its time.
 //!
 //! Disocclusion is strips beside silhouettes, as wide as the parallax between the two surfaces there: mostly
@@ -8,7 +8,7 @@
 //! the part of the picture that the probe stands for. As many times more probes find it there, and each
 //! counts for as much less.
 //!
-//! Measured against the oracle over eight frames each of the towns of `camsim bench` the share is 0.8 to 1.6
+//! Measured against the oracle over eight frames each of the towns of `camsim bench` the fraction is 0.8 to 1.6
 //! times the true one. It is too large, up to twice, where what hides is narrower than a probe's part of the
 //! picture.
 
@@ -63,18 +63,18 @@ impl Disocclusion {
             .with_min_len(16)
             .map(|(probe, source)| dry_run.strip(probe, source, keys, probe_px))
             .collect();
-        let share_of = |weigh: &dyn Fn(&DisocclusionStrip) -> f64| {
+        let fraction_of = |weigh: &dyn Fn(&DisocclusionStrip) -> f64| {
             strips.iter().flatten().fold(0.0, |sum, strip| sum + weigh(strip) / strip.times)
                 / strips.len().max(1) as f64
         };
-        let share = share_of(&|_| 1.0);
-        let weighted_share = share_of(&|strip| strip.width_px.min(1.0));
+        let fraction = fraction_of(&|_| 1.0);
+        let weighted_fraction = fraction_of(&|strip| strip.width_px.min(1.0));
         Self {
-            share,
-            width_px: if share > 0.0 { share_of(&|strip| strip.width_px) / share } else { 0.0 },
-            wide_share: share_of(&|strip| f64::from(u8::from(strip.width_px > max_error_px))),
-            weighted_share,
-            error_dn: CONTRAST_DN * weighted_share.sqrt(),
+            fraction,
+            width_px: if fraction > 0.0 { fraction_of(&|strip| strip.width_px) / fraction } else { 0.0 },
+            wide_fraction: fraction_of(&|strip| f64::from(u8::from(strip.width_px > max_error_px))),
+            weighted_fraction,
+            error_dn: CONTRAST_DN * weighted_fraction.sqrt(),
         }
     }
 }

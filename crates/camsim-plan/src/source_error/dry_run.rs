@@ -59,8 +59,8 @@ pub(crate) struct DryRun<'a> {
 pub(crate) struct ExactSource {
     /// Instant, path time.
     pub t_s: f64,
-    /// Share of the exposure gone by.
-    share: f64,
+    /// Fraction of the exposure gone by.
+    fraction: f64,
     /// Source, ideal pixels.
     pub source_px: DVec2,
     /// Inverse planar depth in the row's camera, 1/m.
@@ -111,7 +111,7 @@ impl DryRun<'_> {
         }
         Some(ExactSource {
             t_s,
-            share: phase + 0.5,
+            fraction: phase + 0.5,
             source_px,
             inverse_depth,
             key_inverse_depth: inverse_depth / point.z,
@@ -215,9 +215,9 @@ impl DryRun<'_> {
         if source_px.is_finite() { source_px.distance(source.source_px) } else { f64::INFINITY }
     }
 
-    /// The key frame's inverse depth of what a probe's ray meets at a share of the exposure, 1/m; 0 = sky.
-    fn key_inverse_depth(&self, probe: &Probe, source: &ExactSource, share: f64) -> f64 {
-        let t_s = self.instant_s(probe, share);
+    /// The key frame's inverse depth of what a probe's ray meets at a fraction of the exposure, 1/m; 0 = sky.
+    fn key_inverse_depth(&self, probe: &Probe, source: &ExactSource, fraction: f64) -> f64 {
+        let t_s = self.instant_s(probe, fraction);
         if t_s == source.t_s {
             return source.key_inverse_depth;
         }
@@ -235,28 +235,28 @@ impl DryRun<'_> {
         source: &ExactSource,
         far_end_inverse_depth: Option<f64>,
     ) -> [f64; 2] {
-        let depths @ [first, _, last] = [0.0, 0.5, 1.0].map(|share| match far_end_inverse_depth {
-            Some(known) if share == source.far_end() => known,
-            _ => self.key_inverse_depth(probe, source, share),
+        let depths @ [first, _, last] = [0.0, 0.5, 1.0].map(|fraction| match far_end_inverse_depth {
+            Some(known) if fraction == source.far_end() => known,
+            _ => self.key_inverse_depth(probe, source, fraction),
         });
         let (direction, shift) = (source.direction, source.relative.1);
-        [first + (last - first) * source.share, parabola_through(depths)(source.share)].map(|between| {
+        [first + (last - first) * source.fraction, parabola_through(depths)(source.fraction)].map(|between| {
             let w = row_inverse_depth(direction, shift, between).unwrap_or(0.0);
             self.off_px(source, direction + w * shift)
         })
     }
 
-    /// Instant at a share of the exposure, 0 to 1.
-    fn instant_s(&self, probe: &Probe, share: f64) -> f64 {
+    /// Instant at a fraction of the exposure, 0 to 1.
+    fn instant_s(&self, probe: &Probe, fraction: f64) -> f64 {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
-        mid_s + self.shutter.exposure_pixel_s(x, y) * (share - 0.5)
+        mid_s + self.shutter.exposure_pixel_s(x, y) * (fraction - 0.5)
     }
 
-    /// Source at a share of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth
+    /// Source at a fraction of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth
     /// in the row's camera.
-    pub fn true_source_px(&self, probe: &Probe, share: f64) -> (DVec2, f64) {
-        let ((_, shift), direction, inverse_depth) = self.seen(probe, self.instant_s(probe, share));
+    pub fn true_source_px(&self, probe: &Probe, fraction: f64) -> (DVec2, f64) {
+        let ((_, shift), direction, inverse_depth) = self.seen(probe, self.instant_s(probe, fraction));
         (self.ideal.px_from_point(direction + inverse_depth * shift), inverse_depth)
     }
 
@@ -264,23 +264,23 @@ impl DryRun<'_> {
     /// silhouette meanwhile.
     pub fn miss_along_surfaces_px(&self, probe: &Probe, path: PathStage, stretches: u32, k: u32) -> f64 {
         let mut along = Vec::new();
-        let px = miss_px(path, stretches, k, |share| {
-            let (source_px, inverse_depth) = self.true_source_px(probe, share);
-            along.push((share, inverse_depth));
+        let px = miss_px(path, stretches, k, |fraction| {
+            let (source_px, inverse_depth) = self.true_source_px(probe, fraction);
+            along.push((fraction, inverse_depth));
             source_px
         });
         let is_step = |pair: &[(f64, f64)]| match *pair {
             [(from, a), (to, b)] => {
-                steps(a, b, |share| self.true_source_px(probe, from + (to - from) * share).1)
+                steps(a, b, |fraction| self.true_source_px(probe, from + (to - from) * fraction).1)
             }
             _ => false,
         };
         if along.windows(2).any(is_step) { 0.0 } else { px }
     }
 
-    /// Source at a share of the exposure, 0 to 1, for a surface of the probe's depth.
-    pub fn source_px(&self, probe: &Probe, source: &ExactSource, share: f64) -> DVec2 {
-        let (rotation, shift) = self.path.pose(self.instant_s(probe, share)).relative_to(self.key_pose);
+    /// Source at a fraction of the exposure, 0 to 1, for a surface of the probe's depth.
+    pub fn source_px(&self, probe: &Probe, source: &ExactSource, fraction: f64) -> DVec2 {
+        let (rotation, shift) = self.path.pose(self.instant_s(probe, fraction)).relative_to(self.key_pose);
         self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + source.inverse_depth * shift)
     }
 
@@ -322,9 +322,9 @@ impl DryRun<'_> {
 }
 
 impl ExactSource {
-    /// Share of the exposure gone by at its end that is farther away.
+    /// Fraction of the exposure gone by at its end that is farther away.
     fn far_end(&self) -> f64 {
-        if self.share > 0.5 { 0.0 } else { 1.0 }
+        if self.fraction > 0.5 { 0.0 } else { 1.0 }
     }
 
     pub fn is_hidden(&self) -> bool {

@@ -13,7 +13,7 @@ use crate::{
     view::{lens_reach::LensReach, plane, probes::Probe},
 };
 
-/// One probe in so many is tested for a silhouette, to estimate the share of those that are at one; not in
+/// One probe in so many is tested for a silhouette, to estimate the fraction of those that are at one; not in
 /// step with the grid of 24 columns.
 const SHARE_STEP: usize = 5;
 /// Phases of the exposure that the probes take turns in. On a shaking mount the middle and the ends may be
@@ -115,8 +115,8 @@ impl<'a> ExactSources<'a> {
         *probe.apart.get_or_init(|| self.dry_run.at_silhouette(&probe.probe, &probe.source, false))
     }
 
-    /// Share of the pixels at silhouettes: of one probe in [`SHARE_STEP`].
-    pub fn silhouette_share(&self) -> f64 {
+    /// Fraction of the pixels at silhouettes: of one probe in [`SHARE_STEP`].
+    pub fn silhouette_fraction(&self) -> f64 {
         let asked: Vec<&ProbeSource> = self.probes.iter().step_by(SHARE_STEP).collect();
         let apart = asked
             .par_iter()
@@ -126,8 +126,8 @@ impl<'a> ExactSources<'a> {
         apart as f64 / asked.len().max(1) as f64
     }
 
-    /// Share of the pixels that are counted apart, given which probes are beside a step or fold.
-    pub fn share_apart(&self, is_beside: impl Fn(usize) -> bool) -> f64 {
+    /// Fraction of the pixels that are counted apart, given which probes are beside a step or fold.
+    pub fn fraction_apart(&self, is_beside: impl Fn(usize) -> bool) -> f64 {
         let apart =
             self.probes.iter().filter(|probe| probe.source.is_hidden() || is_beside(probe.number)).count();
         apart as f64 / self.probes.len().max(1) as f64

@@ -40,7 +40,7 @@ impl ExactSources<'_> {
         let every = probes.len().div_ceil(MISS_PROBES).max(1);
         let miss = |(i, ProbeSource { probe, source, .. }): (usize, &ProbeSource)| {
             let of_stretch =
-                |k| miss_px(blur.path, stretches, k, |share| dry_run.source_px(probe, source, share));
+                |k| miss_px(blur.path, stretches, k, |fraction| dry_run.source_px(probe, source, fraction));
             let at_one_depth = (0..tried).map(|k| of_stretch(k * stretches / tried)).fold(0.0, f64::max);
             let follows = blur.depths == NodeDepths::Each;
             let along_surfaces = follows
@@ -58,8 +58,8 @@ impl ExactSources<'_> {
             (0..ALIASED_INSTANTS)
                 .map(move |n| (probe, (GOLDEN * (i * ALIASED_INSTANTS + n + 1) as f64).fract()))
         };
-        let miss_at = |(ProbeSource { probe, source, .. }, share): (&ProbeSource, f64)| {
-            miss_at_px(blur.path, stretches, share, |share| dry_run.source_px(probe, source, share))
+        let miss_at = |(ProbeSource { probe, source, .. }, fraction): (&ProbeSource, f64)| {
+            miss_at_px(blur.path, stretches, fraction, |fraction| dry_run.source_px(probe, source, fraction))
         };
         let misses: Vec<f64> =
             probes.iter().step_by(every).enumerate().flat_map(instants).map(miss_at).collect();

@@ -75,11 +75,11 @@ fn seen_part(surfaces: &Surfaces, terrain: &Terrain, views: &Views) -> Option<Pa
     for (camera, _, pose) in &views.cameras {
         let last_px = DVec2::from_array(camera.size_px.map(|size| f64::from(size) - 1.0));
         for ray in 0..RAYS[0] * RAYS[1] {
-            let share = DVec2::new(
+            let fraction = DVec2::new(
                 f64::from(ray % RAYS[0]) / f64::from(RAYS[0] - 1),
                 f64::from(ray / RAYS[0]) / f64::from(RAYS[1] - 1),
             );
-            let Some(uv) = camera.unproject(share * last_px) else { continue };
+            let Some(uv) = camera.unproject(fraction * last_px) else { continue };
             let way = pose.ned_from_camera * uv.extend(1.0);
             let hit = surfaces.first_hit(pose.position_ned_m, way).and_then(|hit| hit.terrain);
             let Some(hit) = hit else { continue };

@@ -47,7 +47,7 @@ impl ExposurePath {
     /// From end to end.
     pub const STRAIGHT: Self = Self { path: PathStage::Straight, stretches: 1, stride: 1 };
 
-    /// The path with more nodes; `None` where the path is missed by no more than its share of the tolerance,
+    /// The path with more nodes; `None` where the path is missed by no more than its fraction of the tolerance,
     /// and where there are as many as there may be.
     pub fn finer(self, miss_px: f64, budget: &ErrorBudget) -> Option<Self> {
         let path = PathStage::Quartic;
@@ -86,7 +86,7 @@ pub(crate) struct ExposedFrame<'a> {
 }
 
 impl ExposedFrame<'_> {
-    /// The path with the fewest nodes that is missed by no more than its share of the tolerance; `None` where
+    /// The path with the fewest nodes that is missed by no more than its fraction of the tolerance; `None` where
     /// the exposure does not show.
     pub fn path(&self, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> Option<ExposurePath> {
         self.shows(quality, skipped).then(|| self.path_within(&ErrorBudget::new(quality)))
@@ -109,7 +109,7 @@ impl ExposedFrame<'_> {
         true
     }
 
-    /// The path with the fewest nodes that is missed by no more than its share of a tolerance.
+    /// The path with the fewest nodes that is missed by no more than its fraction of a tolerance.
     pub fn path_within(&self, budget: &ErrorBudget) -> ExposurePath {
         let allowed_px = budget.exposure_path_px();
         if self.motion.blur_sagitta_px <= allowed_px {
@@ -171,8 +171,9 @@ impl ExposedFrame<'_> {
             let mid = self.path.pose(mid_s);
             for k in (0..tried).map(|k| k * stretches / tried) {
                 let pose = |half: u32| {
-                    let share = (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
-                    self.path.pose(mid_s + exposure_s * (share - 0.5)).relative_to(&mid)
+                    let fraction =
+                        (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
+                    self.path.pose(mid_s + exposure_s * (fraction - 0.5)).relative_to(&mid)
                 };
                 let poses: Vec<(DMat3, DVec3)> = (0..=halves).map(pose).collect();
                 for w in [0.0, 1.0 / self.motion.nearest_m] {
@@ -200,28 +201,28 @@ pub(crate) fn may_alias(steps: u32, periods: f64) -> bool {
     f64::from(steps) < LEAST_PER_PERIOD * periods
 }
 
-/// How far the path over the exposure is from its polynomials, given where it is at a share of the exposure
-/// (0 to 1): at one such share.
+/// How far the path over the exposure is from its polynomials, given where it is at a fraction of the exposure
+/// (0 to 1): at one such fraction.
 pub(crate) fn miss_at_px(
     path: PathStage,
     stretches: u32,
-    share: f64,
+    fraction: f64,
     mut place: impl FnMut(f64) -> DVec2,
 ) -> f64 {
-    let along = share * f64::from(stretches);
+    let along = fraction * f64::from(stretches);
     let k = along.floor().min(f64::from(stretches) - 1.0);
     let node = |j: u32| (k + f64::from(j) / f64::from(path.steps())) / f64::from(stretches);
     let nodes: Vec<DVec2> = (0..=path.steps()).map(|j| place(node(j))).collect();
-    let px = Curve::through(&nodes).at((along - k) * f64::from(path.steps())).distance(place(share));
+    let px = Curve::through(&nodes).at((along - k) * f64::from(path.steps())).distance(place(fraction));
     if px.is_finite() { px } else { 0.0 }
 }
 
 /// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a
-/// share of the exposure (0 to 1).
+/// fraction of the exposure (0 to 1).
 pub(crate) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl FnMut(f64) -> DVec2) -> f64 {
     let halves = 2 * path.steps();
-    let share = |half: u32| (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
-    let places: Vec<DVec2> = (0..=halves).map(share).map(place).collect();
+    let fraction = |half: u32| (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
+    let places: Vec<DVec2> = (0..=halves).map(fraction).map(place).collect();
     let miss_px = miss_of(&places);
     if miss_px.is_finite() { miss_px } else { 0.0 }
 }
@@ -259,7 +260,8 @@ mod tests {
     #[test]
     fn aliased_nodes_are_found_at_other_instants() {
         // Thirty periods: both ends, and the middle between them, are at rest.
-        let swing = |share: f64| DVec2::new(2.0 * share, 0.7 * (30.0 * std::f64::consts::TAU * share).sin());
+        let swing =
+            |fraction: f64| DVec2::new(2.0 * fraction, 0.7 * (30.0 * std::f64::consts::TAU * fraction).sin());
         assert!(
             miss_px(PathStage::Straight, 1, 0, swing) < 1e-12 && may_alias(1, 30.0) && !may_alias(120, 30.0)
         );
@@ -287,7 +289,7 @@ mod tests {
     #[test]
     fn the_largest_miss_is_found() {
         for path in PathStage::ALL {
-            let swing = |share: f64| DVec2::new(10.0 * share, (2.5 * share + 0.4).sin());
+            let swing = |fraction: f64| DVec2::new(10.0 * fraction, (2.5 * fraction + 0.4).sin());
             let stretches = 2;
             let found = (0..stretches).map(|k| miss_px(path, stretches, k, swing)).fold(0.0, f64::max);
             let steps = path.steps();

@@ -19,7 +19,7 @@ pub(crate) struct RayLight {
     pub panes: Vec<usize>,
 }
 
-/// Share of the light behind panes below which it is not visible.
+/// Fraction of the light behind panes below which it is not visible.
 const HIDDEN: f64 = 1e-7;
 
 /// Where a ray passes through a blended surface.

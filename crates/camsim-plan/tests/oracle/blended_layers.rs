@@ -143,7 +143,7 @@ fn the_error_by_one_depth_is_predicted() {
     let wide =
         Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(8.0, 8.0, 1.0)), ..pane(RED, 0.3, 40.0) };
     let plain = predicted(with(std::slice::from_ref(&wide)), 40.0, 1).predicted.blended_depth.unwrap();
-    assert!(plain.share > 0.99 && plain.error_dn < 1e-6, "{plain:?}");
+    assert!(plain.fraction > 0.99 && plain.error_dn < 1e-6, "{plain:?}");
     // Alpha from 0 to 0.48 over 480 m to the east, above ground of one colour: of a ray to a point of that,
     // which comes from a camera d m further east, 40 m of 100 m below the pane, alpha differs by 0.001 * 0.4
     // d. Lines are even over the 60 ms.

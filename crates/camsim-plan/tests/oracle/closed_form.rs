@@ -41,11 +41,11 @@ fn row_mid_s(shutter: &ShutterSpec, y: f64, rows: f64) -> f64 {
         FieldOr::Ms(ms) if y % 2.0 == 0.0 => ms,
         _ => 0.0,
     };
-    let share = match shutter.readout {
+    let fraction = match shutter.readout {
         Readout::BottomToTop => 0.5 - (y + 0.5) / rows,
         _ => (y + 0.5) / rows - 0.5,
     };
-    1e-3 * (share * shutter.readout_ms - shutter.delay_ms - earlier_ms)
+    1e-3 * (fraction * shutter.readout_ms - shutter.delay_ms - earlier_ms)
 }
 
 /// Frame 3 of a flight over the plane z = 0: the ideal rays of a grid, imaged by the formula, must be the
@@ -185,17 +185,18 @@ fn the_folding_lens_is_inverted_up_to_its_fold() {
             d(DVec2::X).perp_dot(d(DVec2::Y))
         };
         let fold = (1..).map(|i| 1e-3 * f64::from(i)).find(|&r| area(r) <= 0.0).unwrap();
-        for share in [0.3, 0.8, 0.95, 0.99, 0.998] {
-            let uv = direction * (share * fold);
+        for fraction in [0.3, 0.8, 0.95, 0.99, 0.998] {
+            let uv = direction * (fraction * fold);
             let at_px = to_px(uv);
             let pixel = at_px.round();
             if !(pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < 640.0 && pixel.y < 480.0) {
                 continue;
             }
             let look = oracle.sample(0, [pixel.x as u32, pixel.y as u32], at_px - pixel, 0.0);
-            let found =
-                look.unwrap_or_else(|| panic!("nothing seen at {share} of the fold in direction {spoke}")).uv;
-            assert!(found.distance(uv) < 1e-8, "{spoke} {share}: {found} {uv}");
+            let found = look
+                .unwrap_or_else(|| panic!("nothing seen at {fraction} of the fold in direction {spoke}"))
+                .uv;
+            assert!(found.distance(uv) < 1e-8, "{spoke} {fraction}: {found} {uv}");
             seen += 1;
         }
         // Beyond the farthest image along this direction nothing is seen.

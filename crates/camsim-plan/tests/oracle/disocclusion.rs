@@ -44,7 +44,7 @@ fn with(sequence: &Arc<Sequence>, edit: impl Fn(&mut Scenario)) -> Arc<Sequence>
 /// Over the exposure as the probes look.
 fn counted(sequence: &Arc<Sequence>, plan: &FramePlan) -> f64 {
     let phases: &[f64] = if plan.blur.is_some() { &[-0.5, 0.0, 0.5] } else { &[0.0] };
-    disocclusion(&Oracle::new(sequence.clone()).unwrap(), plan.frame, &plan.key_poses(), phases).share()
+    disocclusion(&Oracle::new(sequence.clone()).unwrap(), plan.frame, &plan.key_poses(), phases).fraction()
 }
 
 fn house() -> Scene {
@@ -85,7 +85,7 @@ fn predicted_disocclusion_is_what_the_oracle_counts() {
             // single probe to say.
             let slack = if keys == 1 { 0.0 } else { 1.0 / f64::from(plan.predicted.probes) };
             assert!(
-                found.share < 2.0 * measured + slack && measured < 2.0 * found.share + slack,
+                found.fraction < 2.0 * measured + slack && measured < 2.0 * found.fraction + slack,
                 "{name}, {keys}: {found:?} {measured:.2e}"
             );
         }

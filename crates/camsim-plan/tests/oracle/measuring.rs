@@ -102,7 +102,7 @@ fn slopes_and_creases_are_no_silhouettes_measured_or_predicted() {
     let near = silhouettes(&Oracle::new(own.clone()).unwrap(), 0, &[0.0]);
     assert!(!near.contains(&true), "{} of 4800", near.iter().filter(|near| **near).count());
     let plan = Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap();
-    assert!(plan.predicted.silhouette_share == 0.0 && plan.predicted.probes > 400, "{:?}", plan.predicted);
+    assert!(plan.predicted.silhouette_fraction == 0.0 && plan.predicted.probes > 400, "{:?}", plan.predicted);
     // A wall does.
     let mut walled = zigzag();
     walled.meshes.push(block(DVec3::ZERO, 15.0, 40.0));
@@ -110,7 +110,7 @@ fn slopes_and_creases_are_no_silhouettes_measured_or_predicted() {
     let near = silhouettes(&Oracle::new(own.clone()).unwrap(), 0, &[0.0]);
     let measured = near.iter().filter(|near| **near).count() as f64 / 4800.0;
     let predicted =
-        Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap().predicted.silhouette_share;
+        Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap().predicted.silhouette_fraction;
     assert!(measured > 0.1 && (predicted - measured).abs() < 0.15, "{measured} {predicted}");
 }
 
@@ -129,7 +129,7 @@ fn a_frame_that_looks_beside_its_ideal_frame_is_not_predicted_to_be_right() {
     assert!(
         beside.predicted.probes == 0
             && !beside.predicted.source_error_kept
-            && beside.predicted.void_share == 1.0,
+            && beside.predicted.void_fraction == 1.0,
         "{:?}",
         beside.predicted
     );
@@ -143,11 +143,11 @@ fn a_frame_that_looks_beside_its_ideal_frame_is_not_predicted_to_be_right() {
     // Half of it.
     let half = plan([160.0, 59.5]).predicted;
     assert!(
-        half.void_share > 0.1 && half.probes > 100 && !half.source_error_kept && half.total_px < 0.05,
+        half.void_fraction > 0.1 && half.probes > 100 && !half.source_error_kept && half.total_px < 0.05,
         "{half:?}"
     );
     let middle = plan([79.5, 59.5]).predicted;
-    assert!(middle.source_error_kept && middle.void_share == 0.0, "{middle:?}");
+    assert!(middle.source_error_kept && middle.void_fraction == 0.0, "{middle:?}");
 }
 
 #[test]

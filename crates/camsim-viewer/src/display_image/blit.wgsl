@@ -17,9 +17,9 @@ struct Corner {
 
 @vertex
 fn vertex_main(@builtin(vertex_index) index: u32) -> Corner {
-    let share = vec2<f32>(f32(index & 1u), f32(index >> 1u));
-    let position = vec4<f32>(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y, 0.0, 1.0);
-    return Corner(position, mix(uv_rect.min, uv_rect.max, share));
+    let fraction = vec2<f32>(f32(index & 1u), f32(index >> 1u));
+    let position = vec4<f32>(2.0 * fraction.x - 1.0, 1.0 - 2.0 * fraction.y, 0.0, 1.0);
+    return Corner(position, mix(uv_rect.min, uv_rect.max, fraction));
 }
 
 @fragment

@@ -9,9 +9,9 @@ use super::picture::{Picture, ramp};
 
 /// Decades below the largest error that the colour scale covers.
 pub const DECADES: f64 = 2.0;
-/// Share of a coloured pixel's brightness that comes from the picture.
+/// Fraction of a coloured pixel's brightness that comes from the picture.
 const PICTURE_SHARE: f32 = 0.4;
-/// Brightness of pixels without predicted error, as a share of the picture's.
+/// Brightness of pixels without predicted error, as a fraction of the picture's.
 const GREY_SHARE: f32 = 0.45;
 
 /// Predicted source errors of one picture.
@@ -118,9 +118,9 @@ mod tests {
         assert_eq!(tinted.pixels[7], Color32::TRANSPARENT);
         // A bright picture changes the brightness, not the hue.
         let white = super::tinted(&ColorImage::new([4, 2], vec![Color32::WHITE; 8]), &map);
-        let share = |pixel: Color32| f32::from(pixel.r()) / f32::from(pixel.g());
+        let fraction = |pixel: Color32| f32::from(pixel.r()) / f32::from(pixel.g());
         assert!(
-            (share(white.pixels[6]) - share(tinted.pixels[6])).abs() < 0.02
+            (fraction(white.pixels[6]) - fraction(tinted.pixels[6])).abs() < 0.02
                 && white.pixels[6].g() > tinted.pixels[6].g()
         );
         assert_eq!(

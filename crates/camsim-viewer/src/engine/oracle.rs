@@ -23,7 +23,7 @@ use super::{
 const STRIP_ROWS: usize = 4;
 /// Least time between two replies, each of which carries the whole picture.
 const REPLY_INTERVAL: Duration = Duration::from_millis(250);
-/// A pixel's standard error as a share of `quality.max_error_dn`, as for `camsim render --backend
+/// A pixel's standard error as a fraction of `quality.max_error_dn`, as for `camsim render --backend
 /// reference`.
 const SHARE_OF_TOLERANCE: f64 = 0.25;
 

@@ -34,7 +34,7 @@ pub struct Difference {
     pub rms_dn: f64,
     /// Largest absolute difference, DN.
     pub max_dn: f64,
-    /// Share of the pixels that are valid in one picture alone.
+    /// Fraction of the pixels that are valid in one picture alone.
     pub one_sided: f64,
 }
 
@@ -96,17 +96,17 @@ pub fn depth_image(size_px: [u32; 2], depth_m: &[f32], range_m: Option<[f32; 2]>
         if d <= 0.0 || !d.is_finite() {
             return Color32::TRANSPARENT;
         }
-        let share = f64::from((d / near).ln() / span).clamp(0.0, 1.0);
-        let [r, g, b] = ramp(1.0 - share);
+        let fraction = f64::from((d / near).ln() / span).clamp(0.0, 1.0);
+        let [r, g, b] = ramp(1.0 - fraction);
         Color32::from_rgb(r, g, b)
     });
     ColorImage::new(size_px.map(|side| side as usize), pixels.collect())
 }
 
 /// Colour scale from dark blue (0) over green to yellow (1) with increasing lightness.
-pub fn ramp(share: f64) -> [u8; 3] {
-    let share = share.clamp(0.0, 1.0);
-    let linear = [0.9 * share.powi(2), 0.02 + 0.8 * share, 0.25 * (1.0 - share).powi(2) + 0.08];
+pub fn ramp(fraction: f64) -> [u8; 3] {
+    let fraction = fraction.clamp(0.0, 1.0);
+    let linear = [0.9 * fraction.powi(2), 0.02 + 0.8 * fraction, 0.25 * (1.0 - fraction).powi(2) + 0.08];
     linear.map(|value| (255.0 * srgb_from_linear_f64(value)).round() as u8)
 }
 
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn difference_has_rms_maximum_and_one_sided_share() {
+    fn difference_has_rms_maximum_and_one_sided_fraction() {
         let a = [0.5, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.0];
         let b = [0.4, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0];
         let result = difference([3, 1], &a, &b, 4.0, 1).expect("of one size");

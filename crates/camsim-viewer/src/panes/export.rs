@@ -144,11 +144,11 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let what = if job.rig.first().output.twin.is_empty() { "frames" } else { "pictures" };
     match progress.ended {
         None => {
-            let share = progress.done as f32 / all as f32;
+            let fraction = progress.done as f32 / all as f32;
             let left = job
                 .remaining_s()
                 .map_or_else(String::new, |remaining_s| format!(", about {} left", duration(remaining_s)));
-            ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} {what}{left}", progress.done)));
+            ui.add(egui::ProgressBar::new(fraction).text(format!("{} of {all} {what}{left}", progress.done)));
             let text = if job.is_cancelled() { "stopping" } else { "Cancel" };
             if ui.add_enabled(!job.is_cancelled(), egui::Button::new(text)).clicked() {
                 out.push(Message::CancelExport);

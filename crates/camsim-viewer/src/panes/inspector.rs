@@ -313,11 +313,11 @@ fn predicted_errors(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
         );
         fact(ui, "samples", samples, "of the exposure");
     });
-    if plan.predicted.void_share > 0.0 {
+    if plan.predicted.void_fraction > 0.0 {
         ui.label(
             egui::RichText::new(format!(
                 "{:.1} % of the pixels have no source",
-                100.0 * plan.predicted.void_share
+                100.0 * plan.predicted.void_fraction
             ))
             .weak(),
         );

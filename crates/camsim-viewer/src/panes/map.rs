@@ -22,7 +22,7 @@ use crate::{
 
 const CAMERA_COLOR: Color32 = Color32::from_rgb(255, 140, 40);
 const OBJECT_COLOR: Color32 = Color32::from_rgb(120, 230, 255);
-/// Length of the rays at the picture's left and right border, as a share of the map.
+/// Length of the rays at the picture's left and right border, as a fraction of the map.
 const VIEW_RAY_SHARE: f64 = 0.08;
 
 /// Draws the page.

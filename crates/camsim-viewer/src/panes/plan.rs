@@ -115,13 +115,23 @@ fn source_error(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
             "bound on the image error of its level of detail",
         );
     }
-    if predicted.silhouette_share > 0.0 {
-        let share = format!("at least {:.1} %", 100.0 * predicted.silhouette_share);
-        fact(ui, "silhouettes", share, "pixels at silhouettes and creases: no bound on their source error");
+    if predicted.silhouette_fraction > 0.0 {
+        let fraction = format!("at least {:.1} %", 100.0 * predicted.silhouette_fraction);
+        fact(
+            ui,
+            "silhouettes",
+            fraction,
+            "pixels at silhouettes and creases: no bound on their source error",
+        );
     }
     if let Some(disocclusion) = predicted.disocclusion {
-        let text = format!("{:.4} %, {:.2} px wide", 100.0 * disocclusion.share, disocclusion.width_px);
-        fact(ui, "disocclusion", text, "share of the picture that no ideal frame shows, behind silhouettes");
+        let text = format!("{:.4} %, {:.2} px wide", 100.0 * disocclusion.fraction, disocclusion.width_px);
+        fact(
+            ui,
+            "disocclusion",
+            text,
+            "fraction of the picture that no ideal frame shows, behind silhouettes",
+        );
     }
 }
 
@@ -158,7 +168,7 @@ fn picture_error(ui: &mut Ui, predicted: &Predicted) {
         );
     }
     if let Some(blended) = predicted.blended_depth {
-        let text = format!("{:.3}, {:.0} % of the picture", blended.error_dn, 100.0 * blended.share);
+        let text = format!("{:.3}, {:.0} % of the picture", blended.error_dn, 100.0 * blended.fraction);
         fact(ui, "blended surfaces", text, "blended surfaces, reprojected by the depth of one");
     }
 }

@@ -145,11 +145,11 @@ fn scrub_bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
     painter.vline(x, rect.y_range(), Stroke::new(2.0, ui.visuals().strong_text_color()));
     let dragged = response.is_pointer_button_down_on();
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| dragged || response.clicked()) {
-        let share = f64::from((pointer.x - inner.left()) / inner.width().max(1.0)).clamp(0.0, 1.0);
+        let fraction = f64::from((pointer.x - inner.left()) / inner.width().max(1.0)).clamp(0.0, 1.0);
         if dragged != timeline.dragged {
             out.push(Message::Timeline(Timeline { dragged, ..timeline.clone() }));
         }
-        out.push(Message::Seek((share * timeline.last() as f64).round() as u64));
+        out.push(Message::Seek((fraction * timeline.last() as f64).round() as u64));
     } else if timeline.dragged {
         out.push(Message::Timeline(Timeline { dragged: false, ..timeline.clone() }));
     }

@@ -43,7 +43,7 @@ const OBJECT_COLOR: Color32 = Color32::from_rgb(120, 230, 255);
 const BACKGROUND: Color32 = Color32::from_rgb(24, 28, 34);
 /// Distance within which a click selects a frame, points.
 const CLICK_RADIUS: f32 = 40.0;
-/// Height of the pane as a share of its width.
+/// Height of the pane as a fraction of its width.
 const HEIGHT: f32 = 0.95;
 
 /// Draws the page.

@@ -11,11 +11,11 @@ use eframe::egui::Context;
 
 use super::Series;
 
-/// Plots that show less than this share of the flight get a refined series.
+/// Plots that show less than this fraction of the flight get a refined series.
 const DETAIL_BELOW_SHARE: f64 = 0.5;
-/// Margin of a refined span to either side, as a share of the visible span, so that panning finds it ready.
+/// Margin of a refined span to either side, as a fraction of the visible span, so that panning finds it ready.
 const MARGIN_SHARE: f64 = 0.5;
-/// A refined span is computed anew when less than this share of it is visible.
+/// A refined span is computed anew when less than this fraction of it is visible.
 const MIN_DETAIL_SHARE: f64 = 0.25;
 
 /// The last series, and at most one computation in progress.

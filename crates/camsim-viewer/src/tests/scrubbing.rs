@@ -15,7 +15,7 @@ fn a_drag_shows_previews_and_its_end_the_full_frame() {
     window.settle();
     let bar = window.harness.get_by_label("timeline").rect();
     let bar_position =
-        |share: f32| egui::pos2(bar.left() + 6.0 + share * (bar.width() - 12.0), bar.center().y);
+        |fraction: f32| egui::pos2(bar.left() + 6.0 + fraction * (bar.width() - 12.0), bar.center().y);
     window.harness.event(egui::Event::PointerMoved(bar_position(0.25)));
     let button = |pressed, pos| egui::Event::PointerButton {
         pos,

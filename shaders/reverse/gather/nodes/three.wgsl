@@ -3,10 +3,10 @@
 var<private> begin_inverse_depth: f32;
 var<private> inverse_depth_slope: f32;
 var<private> inverse_depth_bend: f32;
-var<private> node_share: f32;
+var<private> node_fraction: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
-    node_share = 1.0 / f32(frame.nodes - 1u);
+    node_fraction = 1.0 / f32(frame.nodes - 1u);
     let middle = iterated_inverse_depth(ray.uv, mid_pose(pixel));
     begin_inverse_depth = iterated_inverse_depth_from(middle, ray.uv, pose_at_step(pixel, 0u));
     let end = iterated_inverse_depth_from(middle, ray.uv, end_pose(pixel));
@@ -16,8 +16,8 @@ fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
 }
 
 fn next_node(ray: Ray, node: u32, pose: Pose) -> Source {
-    let share = f32(node) * node_share;
+    let fraction = f32(node) * node_fraction;
     return source_of_depth(
-        ray.uv, pose, begin_inverse_depth + share * (inverse_depth_slope + share * inverse_depth_bend)
+        ray.uv, pose, begin_inverse_depth + fraction * (inverse_depth_slope + fraction * inverse_depth_bend)
     );
 }

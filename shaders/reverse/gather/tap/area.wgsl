@@ -42,7 +42,7 @@ fn sample_index(pixel_footprint: Footprint, read: u32) -> u32 {
     return u32((f32(read) + 0.5) / f32(reads_per_sample(pixel_footprint)));
 }
 
-// Position of a read of two pixels along each axis, and its share of the area.
+// Position of a read of two pixels along each axis, and its fraction of the area.
 fn area_read(pixel_footprint: Footprint, source_px: vec2<f32>, read: u32) -> WeightedRead {
     let pairs_xy = texel_pairs(pixel_footprint);
     let row = floor((f32(read) + 0.5) / pairs_xy.x);

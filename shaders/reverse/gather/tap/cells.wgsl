@@ -67,6 +67,6 @@ fn tap_offset_px(pixel_footprint: Footprint, tap: u32) -> vec2<f32> {
     let columns = select(side.x, side.y, is_transposed);
     let side_x_px = floor((cell_index + 0.5) / columns);
     let cell = vec2<f32>(cell_index - columns * side_x_px, side_x_px);
-    let share = (select(cell, cell.yx, is_transposed) + 0.5) / side - 0.5;
-    return pixel_footprint.dx * share.x + pixel_footprint.dy * share.y;
+    let fraction = (select(cell, cell.yx, is_transposed) + 0.5) / side - 0.5;
+    return pixel_footprint.dx * fraction.x + pixel_footprint.dy * fraction.y;
 }

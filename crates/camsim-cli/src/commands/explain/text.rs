@@ -98,13 +98,14 @@ fn print_level_of_detail(
     memory: Option<&MemoryFacts>,
     console: &mut Console<'_>,
 ) -> Result<(), Failure> {
-    let LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_share, triangle_bytes } = detail;
+    let LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_fraction, triangle_bytes } =
+        detail;
     console.line("terrain in this frame")?;
     console.line(format_args!(
         "  {triangles} triangles, displaced by at most {max_error_px:.3} output px (tolerance {tolerance_px:.3})"
     ))?;
     console.line(format_args!(
-        "  seen from straight above, depth is off by at most {depth_share:.1e} of itself"
+        "  seen from straight above, depth is off by at most {depth_fraction:.1e} of itself"
     ))?;
     if away > 0 {
         console.line(format_args!("  {away} back-facing triangles are not drawn"))?;

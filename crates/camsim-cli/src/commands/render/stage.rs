@@ -44,7 +44,7 @@ pub struct Part<'p> {
     pub variation: Option<VariationRecord>,
     /// The dataset for which it is rendered, in place of its own.
     pub export: Option<DatasetFormat>,
-    /// The share of its frames.
+    /// The fraction of its frames.
     pub shard: Option<Shard>,
 }
 

@@ -36,7 +36,7 @@ pub fn channel_lines(frame: &FrameReport) -> impl Iterator<Item = String> {
 }
 
 /// Percent.
-fn share(part: u64, of: u64) -> f64 {
+fn fraction(part: u64, of: u64) -> f64 {
     100.0 * part as f64 / of.max(1) as f64
 }
 
@@ -59,10 +59,10 @@ fn describe_plane(plane: &PlaneReport) -> String {
          borders of objects ({:.4} %), {} of {} within 1 px of them ({:.2} %); {faults} faults, \
          which no surface near the pixel's ray has: {}",
         channel.name(),
-        share(*beyond_away, *pixels_away),
+        fraction(*beyond_away, *pixels_away),
         beyond - beyond_away,
         pixels - pixels_away,
-        share(beyond - beyond_away, pixels - pixels_away),
+        fraction(beyond - beyond_away, pixels - pixels_away),
         passed(*kept)
     )
 }

@@ -46,8 +46,8 @@ impl Block {
     /// Whether cells between two corners may be at the position of the query.
     fn reaches(&self, low_px: DVec2, high_px: DVec2, query: &FlowQuery<'_>) -> bool {
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for share in query.shares {
-            let (a, b) = (*share * self.low.as_dvec2(), *share * self.high.as_dvec2());
+        for fraction in query.fractions {
+            let (a, b) = (*fraction * self.low.as_dvec2(), *fraction * self.high.as_dvec2());
             (low, high) = (low.min(a).min(b), high.max(a).max(b));
         }
         let slack = query.reach_px + ROUNDING_PX;
@@ -127,9 +127,9 @@ impl Blocks {
 /// A query for the cells at a position.
 pub(super) struct FlowQuery<'a> {
     pub(super) grid: &'a Grid,
-    /// The position at one of `shares` of the interval, or at any time between two of them.
+    /// The position at one of `fractions` of the interval, or at any time between two of them.
     pub(super) position_px: DVec2,
-    pub(super) shares: &'a [f64],
+    pub(super) fractions: &'a [f64],
     pub(super) reach_px: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The bilinear sheet over four pixels: its position after a share of the interval, and its points at a given
+//! The bilinear sheet over four pixels: its position after a fraction of the interval, and its points at a given
 //! position then.
 
 use glam::{DMat2, DVec2};
@@ -26,25 +26,28 @@ pub(super) struct Cell {
 impl Cell {
     /// Calls `found` with each point of this cell that is at `position_px`, and whether the sheet shows its
     /// front there.
-    pub(super) fn sources(&self, position_px: DVec2, share: f64, mut found: impl FnMut(DVec2, bool)) {
-        if !self.is_torn(share) {
-            for within in self.roots(position_px, share) {
+    pub(super) fn sources(&self, position_px: DVec2, fraction: f64, mut found: impl FnMut(DVec2, bool)) {
+        if !self.is_torn(fraction) {
+            for within in self.roots(position_px, fraction) {
                 // Computed from the flow at that point, not from `within`: without motion the source then
                 // equals the position to the last bit.
-                let source_px = position_px - share * self.flow(within);
-                found(source_px, (DMat2::IDENTITY + self.bilinear_slope(within) * share).determinant() > 0.0);
+                let source_px = position_px - fraction * self.flow(within);
+                found(
+                    source_px,
+                    (DMat2::IDENTITY + self.bilinear_slope(within) * fraction).determinant() > 0.0,
+                );
             }
             return;
         }
         for k in 0..4 {
             let corner = corner(k);
-            let slope = self.slope(corner, share);
-            let forward = DMat2::IDENTITY + slope * share;
+            let slope = self.slope(corner, fraction);
+            let forward = DMat2::IDENTITY + slope * fraction;
             let from_corner =
-                forward.inverse() * (position_px - self.place_px - corner - share * self.flows[k]);
+                forward.inverse() * (position_px - self.place_px - corner - fraction * self.flows[k]);
             // Each pixel covers its half of the way to each neighbour. A torn edge has no overlap, because
             // the nearest pixel beyond belongs to another object.
-            let [is_whole_across, is_whole_down] = self.intact_edges(corner, share);
+            let [is_whole_across, is_whole_down] = self.intact_edges(corner, fraction);
             let own = |from_corner: f64, corner: f64, is_whole: bool| {
                 let inwards = if corner > 0.5 { -from_corner } else { from_corner };
                 inwards >= -RIM_PX
@@ -52,7 +55,7 @@ impl Cell {
             };
             if own(from_corner.x, corner.x, is_whole_across) && own(from_corner.y, corner.y, is_whole_down) {
                 found(
-                    position_px - share * (self.flows[k] + slope * from_corner),
+                    position_px - fraction * (self.flows[k] + slope * from_corner),
                     forward.determinant() > 0.0,
                 );
             }
@@ -64,14 +67,14 @@ impl Cell {
     pub(super) fn fallback_sources(
         &self,
         position_px: DVec2,
-        share: f64,
+        fraction: f64,
         rank: impl Fn(DVec2) -> super::Rank,
         mut found: impl FnMut(super::Rank, DVec2),
     ) {
-        if !self.is_torn(share) {
+        if !self.is_torn(fraction) {
             return;
         }
-        for within in self.roots(position_px, share) {
+        for within in self.roots(position_px, fraction) {
             let ranks = [0, 1, 2, 3].map(|k| (k, rank(self.place_px + corner(k))));
             // A pixel with unknown flow is used only if no other exists.
             let best_known = ranks.iter().fold(0.0_f64, |most, (_, rank)| most.max(rank[0]));
@@ -81,7 +84,7 @@ impl Cell {
                 .reduce(|a, b| if b.1 < a.1 { b } else { a });
             let Some((k, rank)) = farthest else { continue };
             let corner = corner(k);
-            let [is_whole_across, is_whole_down] = self.intact_edges(corner, share);
+            let [is_whole_across, is_whole_down] = self.intact_edges(corner, fraction);
             let x = if is_whole_across { within.x } else { corner.x };
             let y = if is_whole_down { within.y } else { corner.y };
             found(rank, self.place_px + DVec2::new(x, y));
@@ -89,12 +92,12 @@ impl Cell {
     }
 
     /// Jacobian of the flow at a point of the cell; zero across torn edges.
-    pub(super) fn slope(&self, within: DVec2, share: f64) -> DMat2 {
-        if !self.is_torn(share) {
+    pub(super) fn slope(&self, within: DVec2, fraction: f64) -> DMat2 {
+        if !self.is_torn(fraction) {
             return self.bilinear_slope(within);
         }
         let nearest = within.round();
-        let [is_whole_across, is_whole_down] = self.intact_edges(nearest, share);
+        let [is_whole_across, is_whole_down] = self.intact_edges(nearest, fraction);
         let slope = self.bilinear_slope(nearest);
         DMat2::from_cols(
             if is_whole_across { slope.x_axis } else { DVec2::ZERO },
@@ -103,19 +106,19 @@ impl Cell {
     }
 
     /// Whether the sheet folds over anywhere in the cell.
-    pub(super) fn folds(&self, share: f64) -> bool {
-        (0..4).any(|k| (DMat2::IDENTITY + self.bilinear_slope(corner(k)) * share).determinant() <= 0.0)
+    pub(super) fn folds(&self, fraction: f64) -> bool {
+        (0..4).any(|k| (DMat2::IDENTITY + self.bilinear_slope(corner(k)) * fraction).determinant() <= 0.0)
     }
 
-    fn is_torn(&self, share: f64) -> bool {
+    fn is_torn(&self, fraction: f64) -> bool {
         let tear = self.across[0].max(self.across[1]).max(self.down[0]).max(self.down[1]);
-        tear * share.abs() > JUMP_PX
+        tear * fraction.abs() > JUMP_PX
     }
 
     /// Whether the two edges that meet in a corner are intact: the horizontal and the vertical one.
-    fn intact_edges(&self, corner: DVec2, share: f64) -> [bool; 2] {
+    fn intact_edges(&self, corner: DVec2, fraction: f64) -> [bool; 2] {
         let [row, column] = [corner.y, corner.x].map(|side| usize::from(side > 0.5));
-        [self.across[row], self.down[column]].map(|tear| tear * share.abs() <= JUMP_PX)
+        [self.across[row], self.down[column]].map(|tear| tear * fraction.abs() <= JUMP_PX)
     }
 
     fn flow(&self, within: DVec2) -> DVec2 {
@@ -130,12 +133,12 @@ impl Cell {
 
     /// Inverse of the bilinear sheet over the displaced corners, `q = u e + v g + u v h`, with up to two
     /// solutions. Eliminating u gives `(q - v g) x (e + v h) = 0`, a quadratic in v.
-    fn roots(&self, position_px: DVec2, share: f64) -> impl Iterator<Item = DVec2> {
+    fn roots(&self, position_px: DVec2, fraction: f64) -> impl Iterator<Item = DVec2> {
         let [a, b, c, d] = self.flows;
-        let q = position_px - self.place_px - share * a;
-        let e = DVec2::X + share * (b - a);
-        let g = DVec2::Y + share * (c - a);
-        let h = share * ((a - b) + (d - c));
+        let q = position_px - self.place_px - fraction * a;
+        let e = DVec2::X + fraction * (b - a);
+        let g = DVec2::Y + fraction * (c - a);
+        let h = fraction * ((a - b) + (d - c));
         let (square, linear, constant) = (-g.perp_dot(h), q.perp_dot(h) + e.perp_dot(g), q.perp_dot(e));
         // NaN without a solution: every comparison below is then false.
         let half = -0.5 * (linear + (linear * linear - 4.0 * square * constant).sqrt().copysign(linear));

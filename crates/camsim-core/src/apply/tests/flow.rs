@@ -101,14 +101,14 @@ fn moving_objects_occlude_and_disocclude_the_background() {
         let (rendered, counts) = pipeline.render_and_count(None);
         let (mut bared, mut on_box) = (0, 0);
         for y in 0..60 {
-            let share = pipeline.shutter.dt_pixel_s(0, y) / 0.1 + 0.5;
+            let fraction = pipeline.shutter.dt_pixel_s(0, y) / 0.1 + 0.5;
             for x in 0..200_u32 {
-                let now = [0, 1].map(|k: usize| BOX_PX[k] - 0.5 + 10.0 * share - f64::from(x));
+                let now = [0, 1].map(|k: usize| BOX_PX[k] - 0.5 + 10.0 * fraction - f64::from(x));
                 // The spline taps reach two pixels, in the output and in the ideal frame (disoccluded areas
                 // have the colour of one pixel). A source exactly at the border of the image may count as on
                 // either side.
-                let at_rim = (f64::from(x) - share * back - 199.5).abs() < 1e-6;
-                let was = f64::from(x) - share * back;
+                let at_rim = (f64::from(x) - fraction * back - 199.5).abs() < 1e-6;
+                let was = f64::from(x) - fraction * back;
                 let covered = now[0] < 0.0 && now[1] > 0.0;
                 let is_bared = !covered && (BOX_PX[0] - 0.5..BOX_PX[1] - 0.5).contains(&was);
                 let is_mixed =
@@ -118,7 +118,7 @@ fn moving_objects_occlude_and_disocclude_the_background() {
                 }
                 let pixel = &rendered.color_rgba()[4 * (y * 200 + x) as usize..][..4];
                 // Content that enters from beyond the border is not in the frame.
-                let beyond = !covered && f64::from(x) - share * back > 199.5;
+                let beyond = !covered && f64::from(x) - fraction * back > 199.5;
                 let expected = if covered { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 0.0, 1.0, 1.0] };
                 let expected = if beyond { [0.0; 4] } else { expected };
                 assert!(

@@ -37,12 +37,12 @@ impl Fourier {
             fast_length(size[k] + 2 * margin)
         });
         let along = grid.map(frequencies);
-        let share = 1.0 / (grid[0] * grid[1]) as f32;
+        let fraction = 1.0 / (grid[0] * grid[1]) as f32;
         let channels = if transfer.is_gray() { 1 } else { 3 };
         let factors = (0..channels)
             .map(|channel| {
                 let mut factors = transfer.on_grid(channel, [&along[0], &along[1]]);
-                factors.par_iter_mut().for_each(|factor| *factor *= share);
+                factors.par_iter_mut().for_each(|factor| *factor *= fraction);
                 factors
             })
             .collect();

@@ -20,7 +20,7 @@ pub enum KernelError {
     },
     /// NaN, infinite or negative.
     #[error(
-        "the value in column {column}, row {row} (counted from 1) is {value}; values are shares of light: subtract \
+        "the value in column {column}, row {row} (counted from 1) is {value}; values are fractions of light: subtract \
          the dark level, and write 0 for what is below it"
     )]
     Value {
@@ -47,7 +47,7 @@ impl SpreadKernel {
     /// A kernel of values in any scale, row by row.
     ///
     /// # Errors
-    /// Values that are no shares of light.
+    /// Values that are no fractions of light.
     pub fn new(size: [usize; 2], channels: [Vec<f64>; 3]) -> Result<Self, KernelError> {
         let [width, height] = size;
         let mut kernel = Self { size, channels };

@@ -46,7 +46,7 @@ fn at(rgba: &[f32], x: u32, y: u32) -> [f32; 3] {
     [rgba[i], rgba[i + 1], rgba[i + 2]]
 }
 
-/// The share of a wave's amplitude that is left in the middle of the picture.
+/// The fraction of a wave's amplitude that is left in the middle of the picture.
 fn left_of_wave(spec: PointSpreadSpec, cycles_px: [f64; 2]) -> f64 {
     let wave =
         |x: f64, y: f64| 0.5 + 0.4 * (TAU * (cycles_px[0] * (x - 48.0) + cycles_px[1] * (y - 40.0))).cos();
@@ -142,7 +142,7 @@ fn pixels_without_a_ray_neither_give_nor_get_light() {
 }
 
 #[test]
-fn glare_is_a_share_of_the_mean() {
+fn glare_is_a_fraction_of_the_mean() {
     let half = picture(|x, _| if x < 48.0 { [0.8, 0.4, 0.0] } else { [0.0; 3] });
     let mut with_hole = half.clone();
     with_hole[..RGBA * 96].fill(0.0);

@@ -120,10 +120,10 @@ impl LensTransfer {
     }
 }
 
-/// Transfer function of a circular aperture without aberrations, of a frequency in shares of its cut-off.
-fn diffraction(share: f64) -> f64 {
-    if share >= 1.0 {
+/// Transfer function of a circular aperture without aberrations, of a frequency in fractions of its cut-off.
+fn diffraction(fraction: f64) -> f64 {
+    if fraction >= 1.0 {
         return 0.0;
     }
-    2.0 / PI * (share.acos() - share * (1.0 - share * share).sqrt())
+    2.0 / PI * (fraction.acos() - fraction * (1.0 - fraction * fraction).sqrt())
 }

@@ -35,16 +35,16 @@ impl Grid {
     /// Starts of a block's points: bilinear between the nodes, NaN outside of the grid.
     #[inline(always)]
     pub(super) fn start(&self, block: &mut Block) {
-        let (mut first, mut share) = ([0; BLOCK], [[0.0; BLOCK]; 2]);
+        let (mut first, mut fraction) = ([0; BLOCK], [[0.0; BLOCK]; 2]);
         let [x, y] = &block.image;
         for i in 0..BLOCK {
             let (column, of_x) = cell((x[i] - self.low.x) * self.cells_per_unit.x);
             let (row, of_y) = cell((y[i] - self.low.y) * self.cells_per_unit.y);
             first[i] = row * (CELLS as u64 + 1) + column;
-            (share[0][i], share[1][i]) = (of_x, of_y);
+            (fraction[0][i], fraction[1][i]) = (of_x, of_y);
         }
         for i in 0..BLOCK {
-            let start = self.between(first[i] as usize, [share[0][i], share[1][i]]);
+            let start = self.between(first[i] as usize, [fraction[0][i], fraction[1][i]]);
             (block.at[0][i], block.at[1][i]) = (start.x, start.y);
         }
     }
@@ -58,7 +58,7 @@ impl Grid {
     }
 }
 
-/// The cell of a place along a side, and the share of it, NaN outside. Without a conversion that saturates, so that
+/// The cell of a place along a side, and the fraction of it, NaN outside. Without a conversion that saturates, so that
 /// it becomes vector instructions.
 #[inline(always)]
 fn cell(place: f64) -> (u64, f64) {

@@ -44,8 +44,8 @@ impl Polynomials {
         for i in 0..CELLS {
             let place = |local: f64| {
                 // Not the first of the next cell.
-                let share = (0.5 + 0.5 * local).clamp(1e-9, 1.0 - 1e-9);
-                (i as f64 + share) / self.cells_per_unit
+                let fraction = (0.5 + 0.5 * local).clamp(1e-9, 1.0 - 1e-9);
+                (i as f64 + fraction) / self.cells_per_unit
             };
             if !TESTED.iter().all(|local| is_good(self, place(*local))) {
                 self.cells[i] = [f64::NAN; TERMS];
@@ -69,9 +69,9 @@ fn fit(function: impl Fn(f64) -> f64) -> [f64; TERMS] {
     let (mut before, mut now) = ([0.0; TERMS], [0.0; TERMS]);
     (before[0], now[1]) = (1.0, 1.0);
     for k in 0..TERMS {
-        let share = weight(k);
+        let fraction = weight(k);
         for (power, term) in powers.iter_mut().zip(before) {
-            *power += share * term;
+            *power += fraction * term;
         }
         // T(k + 1) = 2 x T(k) - T(k - 1), here with T(k) as `before`.
         let mut next = [0.0; TERMS];

@@ -68,14 +68,14 @@ fn many_points_are_solved_as_single_ones() {
                     "{name} {point}: {many} is no unit ray"
                 );
             }
-            let share = unsolved as f64 / points.len() as f64;
+            let fraction = unsolved as f64 / points.len() as f64;
             let is_bulk = !matches!(
                 lens.model(),
                 LensModel::Fisheye624 | LensModel::Equirectangular | LensModel::Table
             );
             // Beside folds points are solved singly.
-            assert!(!is_bulk || share < 0.2, "{name}, rays {is_ray}: {share} remain");
-            assert!(is_bulk || share > 0.5, "{name} is solved in bulk after all: leave it out here");
+            assert!(!is_bulk || fraction < 0.2, "{name}, rays {is_ray}: {fraction} remain");
+            assert!(is_bulk || fraction > 0.5, "{name} is solved in bulk after all: leave it out here");
         }
     }
 }

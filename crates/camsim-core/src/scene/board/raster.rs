@@ -78,14 +78,14 @@ pub(super) fn draw(layout: &Layout, scale: &Scale) -> Texture {
 }
 
 /// Adds a coverage to each texel between two corners.
-fn add(black: &mut [f32], size: [u32; 2], low: DVec2, high: DVec2, share: impl Fn(f64, f64) -> f64) {
+fn add(black: &mut [f32], size: [u32; 2], low: DVec2, high: DVec2, fraction: impl Fn(f64, f64) -> f64) {
     let range = |low: f64, high: f64, side: u32| {
         (low.floor().max(0.0) as u32)..(high.ceil().clamp(0.0, f64::from(side)) as u32)
     };
     for y in range(low.y, high.y, size[1]) {
         for x in range(low.x, high.x, size[0]) {
             if let Some(texel) = black.get_mut((y * size[0] + x) as usize) {
-                *texel += share(f64::from(x), f64::from(y)) as f32;
+                *texel += fraction(f64::from(x), f64::from(y)) as f32;
             }
         }
     }

@@ -82,18 +82,18 @@ fn unaligned_edges_are_off_by_less_than_a_thousandth() {
     for tag in board.points().chunks_exact(4) {
         let (corner, right) = (tag[3].position_m, tag[2].position_m);
         let gap = 0.2718 * 0.088;
-        for share in [0.1, 0.5, 0.9] {
+        for fraction in [0.1, 0.5, 0.9] {
             let left = edge_m(
                 &board,
                 &picture,
-                corner + DVec2::new(-0.5 * gap, share * 0.088),
-                corner + DVec2::new(0.008, share * 0.088),
+                corner + DVec2::new(-0.5 * gap, fraction * 0.088),
+                corner + DVec2::new(0.008, fraction * 0.088),
             );
             let on_right = edge_m(
                 &board,
                 &picture,
-                right + DVec2::new(-0.008, share * 0.088),
-                right + DVec2::new(0.5 * gap, share * 0.088),
+                right + DVec2::new(-0.008, fraction * 0.088),
+                right + DVec2::new(0.5 * gap, fraction * 0.088),
             );
             worst = worst.max((left - 0.5 * gap).abs()).max((on_right - 0.008).abs());
         }

@@ -166,5 +166,5 @@ fn parts_of_sun_and_sky_add_up_to_the_baked_light() {
     }
     assert!(dark > 100, "{dark}");
     // Ground that is all sky's stays as it is in the shadow.
-    assert_eq!(Terrain::sky_share(&baked(&sun()), [0, 1, 2], [0.2, 0.3, 0.5]), 1.0);
+    assert_eq!(Terrain::sky_fraction(&baked(&sun()), [0, 1, 2], [0.2, 0.3, 0.5]), 1.0);
 }

@@ -101,8 +101,8 @@ pub(super) fn distance2<const AXES: usize>(point: &Point<AXES>, [a, b, c]: [&Poi
 pub(super) fn from_segment2<const AXES: usize>(point: &Point<AXES>, a: &Point<AXES>, b: &Point<AXES>) -> f64 {
     let (along, v) = (minus(b, a), minus(point, a));
     let length2 = dot(&along, &along);
-    let share = if length2 > 0.0 { (dot(&along, &v) / length2).clamp(0.0, 1.0) } else { 0.0 };
-    let left: Point<AXES> = std::array::from_fn(|k| v[k] - share * along[k]);
+    let fraction = if length2 > 0.0 { (dot(&along, &v) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    let left: Point<AXES> = std::array::from_fn(|k| v[k] - fraction * along[k]);
     dot(&left, &left)
 }
 

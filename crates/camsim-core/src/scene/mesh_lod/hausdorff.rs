@@ -21,7 +21,7 @@ const TRIANGLES_A_TASK: usize = 1024;
 const SAMPLE_STRIDE: usize = 64;
 /// Ratio of the sizes of a part and its nearest triangle above which the part is cut into four.
 const QUARTER_RATIO: f64 = 4.0;
-/// Share of a triangle's height that is not worth a cut.
+/// Fraction of a triangle's height that is not worth a cut.
 const SLIVER: f64 = 1e-9;
 /// A part is cut only if its bound exceeds the known distance by this factor.
 const CUT_RATIO: f64 = 1.1;

@@ -34,8 +34,8 @@ pub enum Between<V> {
 struct Place {
     key: usize,
     next: usize,
-    /// Share of the way from one to the other, 0 to 1.
-    share: f64,
+    /// Fraction of the way from one to the other, 0 to 1.
+    fraction: f64,
     /// Time between them; 0 beyond the ends.
     span_s: f64,
 }
@@ -74,12 +74,12 @@ impl<V> Curve<V> {
         let last = self.times_s.len() - 1;
         let key = self.times_s.partition_point(|&key_s| key_s <= t_s);
         if key == 0 {
-            return Place { key: 0, next: 0, share: 0.0, span_s: 0.0 };
+            return Place { key: 0, next: 0, fraction: 0.0, span_s: 0.0 };
         }
         let (key, next) = (key - 1, key.min(last));
         let span_s = self.times_s[next] - self.times_s[key];
-        let share = if span_s > 0.0 { (t_s - self.times_s[key]) / span_s } else { 0.0 };
-        Place { key, next, share, span_s }
+        let fraction = if span_s > 0.0 { (t_s - self.times_s[key]) / span_s } else { 0.0 };
+        Place { key, next, fraction, span_s }
     }
 }
 
@@ -133,16 +133,16 @@ impl Curve<DVec3> {
     /// Value and derivative a second at a time; constant beyond the ends.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (DVec3, DVec3) {
-        let Place { key, next, share, span_s } = self.place(t_s);
+        let Place { key, next, fraction, span_s } = self.place(t_s);
         let (a, b) = (self.values[key], self.values[next]);
         if span_s == 0.0 {
             return (a, DVec3::ZERO);
         }
         match &self.between {
             Between::Step => (a, DVec3::ZERO),
-            Between::Linear => (a + share * (b - a), (b - a) / span_s),
+            Between::Linear => (a + fraction * (b - a), (b - a) / span_s),
             Between::Cubic { arriving, leaving } => {
-                let (value, rate) = hermite(share, span_s);
+                let (value, rate) = hermite(fraction, span_s);
                 let sum = |w: [f64; 4]| w[0] * a + w[1] * b + w[2] * leaving[key] + w[3] * arriving[next];
                 (sum(value), sum(rate))
             }
@@ -177,8 +177,8 @@ impl Curve<DVec3> {
 
     /// Value and derivative just before a time.
     fn before(&self, t_s: f64) -> (DVec3, DVec3) {
-        let Place { key, share, .. } = self.place(t_s);
-        if share > 0.0 || self.times_s[key] != t_s || key == 0 {
+        let Place { key, fraction, .. } = self.place(t_s);
+        if fraction > 0.0 || self.times_s[key] != t_s || key == 0 {
             return self.at(t_s);
         }
         let (value, arriving) = match &self.between {
@@ -199,7 +199,7 @@ impl Curve<DQuat> {
     /// Rotation and angular rate in the outer axes, rad/s; constant beyond the ends.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (DQuat, DVec3) {
-        let Place { key, next, share, span_s } = self.place(t_s);
+        let Place { key, next, fraction, span_s } = self.place(t_s);
         let (a, b) = (self.values[key], self.values[next]);
         if span_s == 0.0 {
             return (a.normalize(), DVec3::ZERO);
@@ -208,10 +208,10 @@ impl Curve<DQuat> {
             Between::Step => (a.normalize(), DVec3::ZERO),
             Between::Linear => {
                 let turn = short_turn(a, b);
-                ((so3::exp(share * turn) * a).normalize(), turn / span_s)
+                ((so3::exp(fraction * turn) * a).normalize(), turn / span_s)
             }
             Between::Cubic { arriving, leaving } => {
-                let (value, rate) = hermite(share, span_s);
+                let (value, rate) = hermite(fraction, span_s);
                 let sum = |w: [f64; 4]| a * w[0] + b * w[1] + leaving[key] * w[2] + arriving[next] * w[3];
                 let (raw, change) = (sum(value), sum(rate));
                 let rotation = raw.normalize();

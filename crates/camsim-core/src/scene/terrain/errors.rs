@@ -213,10 +213,14 @@ impl ChunkGrid<'_> {
         Vec3::from(self.vertices[(j * (self.cells[0] + 1) + i) as usize].offset_m).as_dvec3()
     }
 
-    /// Point on a grid line, at `share` of the way from a vertex to the one `step` further.
-    fn between(&self, from: [i32; 2], step: [i32; 2], share: f64) -> DVec3 {
+    /// Point on a grid line, at `fraction` of the way from a vertex to the one `step` further.
+    fn between(&self, from: [i32; 2], step: [i32; 2], fraction: f64) -> DVec3 {
         let start = self.at(from[0], from[1]);
-        if share == 0.0 { start } else { start.lerp(self.at(from[0] + step[0], from[1] + step[1]), share) }
+        if fraction == 0.0 {
+            start
+        } else {
+            start.lerp(self.at(from[0] + step[0], from[1] + step[1]), fraction)
+        }
     }
 }
 
@@ -261,7 +265,7 @@ fn needing(depth: u32) -> [[i32; 2]; 4] {
 fn share_borders(keys: &mut [u16], [columns, rows]: [u32; 2], depth: u32) {
     let step = (32 >> (depth / 2)) as usize;
     let side = SIDE as usize;
-    let mut share = |a: usize, b: usize| {
+    let mut fraction = |a: usize, b: usize| {
         let worst = keys[a].max(keys[b]);
         (keys[a], keys[b]) = (worst, worst);
     };
@@ -269,10 +273,10 @@ fn share_borders(keys: &mut [u16], [columns, rows]: [u32; 2], depth: u32) {
         let (first, along) = (chunk * PER_CHUNK, columns as usize);
         for at in (step..side).step_by(2 * step) {
             if !(chunk + 1).is_multiple_of(along) {
-                share(first + at * side + side - 1, first + PER_CHUNK + at * side);
+                fraction(first + at * side + side - 1, first + PER_CHUNK + at * side);
             }
             if chunk + along < along * rows as usize {
-                share(first + (side - 1) * side + at, first + along * PER_CHUNK + at);
+                fraction(first + (side - 1) * side + at, first + along * PER_CHUNK + at);
             }
         }
     }

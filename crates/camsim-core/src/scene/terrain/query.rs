@@ -53,10 +53,10 @@ impl Terrain {
         is_met
     }
 
-    /// Share of the light at a point of a triangle that is left in the shadow, by the triangle's vertices and
+    /// Fraction of the light at a point of a triangle that is left in the shadow, by the triangle's vertices and
     /// their weights; 1 in a scene without shadows.
     #[must_use]
-    pub fn sky_share(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
+    pub fn sky_fraction(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
         let part = |k: usize| -> f64 {
             let of_corner =
                 |c: usize| self.light_parts.get(corners[c] as usize).map_or(0.0, |of| of[k].into());

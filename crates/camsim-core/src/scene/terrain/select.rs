@@ -80,8 +80,8 @@ impl TerrainDetail<'_> {
     /// the octave's chord, which is off by a factor of at most 1.0615; displacement grows at least in
     /// proportion to the error.
     fn error_px(&self, steps: i32) -> f64 {
-        let share = 1.0615 * (f64::from(steps) / 128.0).exp2();
-        (share * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
+        let fraction = 1.0615 * (f64::from(steps) / 128.0).exp2();
+        (fraction * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
     }
 
     fn chunk_part(&self, known: &Tolerances, place: u32, chunk: u32, from_above: bool) -> ChunkMesh {

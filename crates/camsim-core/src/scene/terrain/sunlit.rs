@@ -223,7 +223,7 @@ mod tests {
             (30..60).for_each(|i| heights[90 * 150 + i] += 60.0);
             heights
         };
-        for (rough_m, azimuth_deg, elevation_deg, least_share) in [
+        for (rough_m, azimuth_deg, elevation_deg, least_fraction) in [
             (0.0, 250.0, 25.0, 0.3),
             (0.0, 20.0, 12.0, 0.1),
             (0.5, 135.0, 40.0, 0.5),
@@ -246,12 +246,12 @@ mod tests {
                 assert!(is_open || !is_lit, "{from} with the sun at {azimuth_deg}, {elevation_deg}");
                 (lit, open, all) = (lit + u32::from(is_lit), open + u32::from(is_open), all + 1);
             }
-            let share = f64::from(lit) / f64::from(all);
+            let fraction = f64::from(lit) / f64::from(all);
             eprintln!(
-                "{elevation_deg} deg, {rough_m} m: {share:.2} known, {:.2} lit",
+                "{elevation_deg} deg, {rough_m} m: {fraction:.2} known, {:.2} lit",
                 f64::from(open) / f64::from(all)
             );
-            assert!(share >= least_share, "{share}");
+            assert!(fraction >= least_fraction, "{fraction}");
         }
     }
 }

@@ -40,7 +40,7 @@ fn near_silhouettes_dn(case: &Case, ideal: &[IdealImage], expected: &[f32]) -> f
 }
 
 #[test]
-fn rays_give_each_surface_its_share_of_area_and_exposure() {
+fn rays_give_each_surface_its_fraction_of_area_and_exposure() {
     for (exposure_ms, most_dn) in [(0.0, 4.0), (100.0, 4.0)] {
         let mut case = over_roof(by_rays(40.0, exposure_ms, 1), TURN);
         assert!(case.plan.edges.has_rays(), "{:?}", case.plan.edges);
@@ -57,14 +57,14 @@ fn rays_give_each_surface_its_share_of_area_and_exposure() {
 
 impl ReversePass<'_> {
     /// The key frame that shows what a ray of a pixel meets.
-    fn key_of_ray(&self, position: [u32; 2], uv: DVec2, share: f64) -> Option<usize> {
+    fn key_of_ray(&self, position: [u32; 2], uv: DVec2, fraction: f64) -> Option<usize> {
         let pixel = Pixel {
             position,
             ray: Ray { uv, ..Ray::default() },
             key: 0,
             exposure: self.rows.exposure(0, position),
         };
-        let (image, _) = self.first_surface_of_keys(&pixel, uv, share)?;
+        let (image, _) = self.first_surface_of_keys(&pixel, uv, fraction)?;
         self.keys.iter().position(|key| key.silhouettes.as_ref().is_some_and(|of| std::ptr::eq(of, image)))
     }
 }
@@ -101,9 +101,9 @@ fn rays_through_key_frames_agree_with_their_twin() {
         case.with_pass(&ideal, |pass| {
             for (i, pixel) in case.pixels().filter(|(i, _)| near[*i]) {
                 with_keys_of_pixel(&case.sequence, plan, &frames, 1.0 / 50.0, pixel, |uv, d_uv, keys| {
-                    for share in [0.05, 0.95] {
-                        let (key, _) = first_surface_of_keys(uv, share, keys, &plan.ideal).unwrap();
-                        let found = pass.key_of_ray(pixel, uv, share);
+                    for fraction in [0.05, 0.95] {
+                        let (key, _) = first_surface_of_keys(uv, fraction, keys, &plan.ideal).unwrap();
+                        let found = pass.key_of_ray(pixel, uv, fraction);
                         other_key += u32::from(found != Some(key));
                         later_keys += key;
                     }

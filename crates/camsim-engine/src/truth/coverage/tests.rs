@@ -22,9 +22,9 @@ fn rays_are_a_net() {
     }
 }
 
-/// Share of the cube |x|, |y|, |z| <= 1/2 with normal . (x, y, z) <= c, for a normal without zeros: by
+/// Fraction of the cube |x|, |y|, |z| <= 1/2 with normal . (x, y, z) <= c, for a normal without zeros: by
 /// inclusion and exclusion of corners.
-fn share(normal: DVec3, c: f64) -> f64 {
+fn fraction(normal: DVec3, c: f64) -> f64 {
     let sides = normal.abs();
     let shifted = c + 0.5 * sides.element_sum();
     let corners = (0..8_u32).map(|corner| {
@@ -47,7 +47,7 @@ fn a_straight_border_at_any_speed_has_the_stated_error() {
             for j in 0..40 {
                 let c = (f64::from(j) / 39.0 - 0.5) * normal.abs().element_sum();
                 let found = rays.iter().filter(|ray| normal.dot(**ray) <= c).count() as f64 / 64.0;
-                let off = found - share(normal, c);
+                let off = found - fraction(normal, c);
                 (most, squares, count) = (most.max(off.abs()), squares + off * off, count + 1.0);
             }
         }

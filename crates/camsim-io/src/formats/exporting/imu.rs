@@ -243,7 +243,7 @@ impl Biases {
             self.last = next;
             self.next = self.rows.next_row()?;
         }
-        let share = match &self.next {
+        let fraction = match &self.next {
             Some(next) if t_ns > self.last.true_ns => {
                 (t_ns - self.last.true_ns) as f64 / (next.true_ns - self.last.true_ns) as f64
             }
@@ -251,8 +251,8 @@ impl Biases {
         };
         let next = self.next.as_ref().unwrap_or(&self.last);
         Ok([
-            self.last.gyro_bias_rad_s.lerp(next.gyro_bias_rad_s, share),
-            self.last.acc_bias_m_s2.lerp(next.acc_bias_m_s2, share),
+            self.last.gyro_bias_rad_s.lerp(next.gyro_bias_rad_s, fraction),
+            self.last.acc_bias_m_s2.lerp(next.acc_bias_m_s2, fraction),
         ])
     }
 }

@@ -107,7 +107,7 @@ pub(crate) fn timing(camera: &RunCamera) -> String {
     let (resets_globally, lines, direction) =
         (shutter.reset() == Reset::Global, shutter.lines(), direction(camera));
     let apart_ms = if resets_globally { 0.5 * readout_ms } else { readout_ms };
-    let share = match camera.spec.shutter.readout {
+    let fraction = match camera.spec.shutter.readout {
         Readout::MiddleOutward => "(|2y + 1 - N| - 1)/N",
         Readout::EdgesInward => "(1 - |2y + 1 - N|)/N",
         _ => "((y + 0.5)/N - 0.5)",
@@ -119,7 +119,7 @@ pub(crate) fn timing(camera: &RunCamera) -> String {
         false => String::new(),
     };
     format!(
-        "{centre}; row (or column) y of N = {lines} is exposed {share} {apart_ms} ms later, read {direction}{growing}"
+        "{centre}; row (or column) y of N = {lines} is exposed {fraction} {apart_ms} ms later, read {direction}{growing}"
     )
 }
 

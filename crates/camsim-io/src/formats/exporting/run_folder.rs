@@ -311,7 +311,7 @@ impl RunCamera {
         self.require(format, &["rows"])?;
         let columns = ["row", "position_ned_m", "ned_from_camera_wxyz"];
         let mut rows = CsvRows::open::<RowRecord>(&self.file(frame, "rows"), &columns)?;
-        let (first, second, share) = self.shutter.centre_lines();
+        let (first, second, fraction) = self.shutter.centre_lines();
         let mut middle: Vec<(DVec3, DQuat)> = Vec::with_capacity(2);
         while rows.advance()? {
             let row: u32 = rows.whole(0)?;
@@ -323,7 +323,7 @@ impl RunCamera {
             let message = "has no row of the image's middle; render it again".to_owned();
             return Err(DatasetError::Input { path: self.file(frame, "rows"), message });
         };
-        Ok(CameraPose { position_ned_m: a.0.lerp(b.0, share), ned_from_camera: a.1.slerp(b.1, share) })
+        Ok(CameraPose { position_ned_m: a.0.lerp(b.0, fraction), ned_from_camera: a.1.slerp(b.1, fraction) })
     }
 
     /// Camera matrix and lens.

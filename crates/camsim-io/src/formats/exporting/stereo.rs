@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::DatasetError;
 use super::run_folder::RunCamera;
 
-/// How far two cameras may be from a pair: pixels of the matrix, radians of the axes, share of the distance along the
+/// How far two cameras may be from a pair: pixels of the matrix, radians of the axes, fraction of the distance along the
 /// axis.
 const TOLERANCE: f64 = 1e-6;
 

@@ -43,12 +43,12 @@ pub(super) fn chromatic(entries: &[Tca], focal_mm: f64, half_short: f64) -> Opti
     let low = entries.get(after.saturating_sub(1))?;
     let high = entries.get(after).unwrap_or(low);
     let span = high.focal_mm - low.focal_mm;
-    let share = if span > 0.0 { ((focal_mm - low.focal_mm) / span).clamp(0.0, 1.0) } else { 0.0 };
+    let fraction = if span > 0.0 { ((focal_mm - low.focal_mm) / span).clamp(0.0, 1.0) } else { 0.0 };
     let terms = |of: fn(&Tca) -> [f64; 3]| {
         let [a, b] = [of(low), of(high)];
         let mut scale = vec![0.0; 3];
         for (i, term) in scale.iter_mut().enumerate() {
-            *term = (a[i] + share * (b[i] - a[i])) * half_short.powi(i as i32);
+            *term = (a[i] + fraction * (b[i] - a[i])) * half_short.powi(i as i32);
         }
         while scale.len() > 1 && scale.last() == Some(&0.0) {
             scale.pop();

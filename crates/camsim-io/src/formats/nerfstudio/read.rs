@@ -24,7 +24,7 @@ const POSES: &str = "pictures and poses";
 const OWN: &str = "as that of the root, where the root has none; refused if both differ";
 const OTHER_LENS: &str =
     "a lens of instant-ngp that is not imported: calibrate with OPENCV or OPENCV_FISHEYE";
-const SHUTTER: &str = "instant-ngp's shares of the motion between two poses: set shutter.readout_ms";
+const SHUTTER: &str = "instant-ngp's fractions of the motion between two poses: set shutter.readout_ms";
 const MASK: &str = "mask of unused pixels: set photometric.vignette if they are dark";
 
 pub(crate) const READER: Reader = Reader {

@@ -18,7 +18,7 @@ pub(super) enum Law {
     Number(Distribution),
     /// A list of independent numbers.
     Numbers(Vec<Distribution>),
-    /// One of these values, by their shares.
+    /// One of these values, by their fractions.
     Choice(Vec<Value>, Vec<f64>),
     /// The value that stands there, times a drawn one.
     Times(Box<Law>),
@@ -116,7 +116,7 @@ impl Law {
                 let one = |(i, distribution)| drawn(distribution, unit(&join(name, &format!("{i}"))));
                 Ok(Value::Array(list.iter().enumerate().map(one).collect()))
             }
-            Self::Choice(values, shares) => Ok(values[choose(shares, unit(name))].clone()),
+            Self::Choice(values, fractions) => Ok(values[choose(fractions, unit(name))].clone()),
             Self::Times(law) => combined(base, &law.value(seed, name, index, None)?, |a, b| a * b),
             Self::Plus(law) => combined(base, &law.value(seed, name, index, None)?, |a, b| a + b),
             Self::Piece(length) => piece(base, *length, unit(name)),
@@ -140,22 +140,22 @@ fn drawn(distribution: &Distribution, unit: f64) -> Value {
 fn choice(given: &Value, weights: Option<&Value>) -> Result<Law, String> {
     let values = given.as_array().filter(|values| !values.is_empty());
     let values = values.ok_or("choice: expected a list of values, such as { choice = [1, 2, 5] }")?;
-    let shares = match weights {
+    let fractions = match weights {
         None => vec![1.0; values.len()],
         Some(weights) => {
-            let shares: Option<Vec<f64>> =
+            let fractions: Option<Vec<f64>> =
                 weights.as_array().and_then(|weights| weights.iter().map(number).collect());
-            let is_legal = |shares: &Vec<f64>| {
-                shares.len() == values.len()
-                    && shares.iter().all(|share| *share >= 0.0 && share.is_finite())
-                    && shares.iter().sum::<f64>() > 0.0
+            let is_legal = |fractions: &Vec<f64>| {
+                fractions.len() == values.len()
+                    && fractions.iter().all(|fraction| *fraction >= 0.0 && fraction.is_finite())
+                    && fractions.iter().sum::<f64>() > 0.0
             };
-            shares.filter(is_legal).ok_or_else(|| {
+            fractions.filter(is_legal).ok_or_else(|| {
                 format!("weights: expected {} numbers, 0 or more, one for each choice", values.len())
             })?
         }
     };
-    Ok(Law::Choice(values.clone(), shares))
+    Ok(Law::Choice(values.clone(), fractions))
 }
 
 /// A distribution of two numbers, or of two lists of numbers.

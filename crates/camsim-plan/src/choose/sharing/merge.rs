@@ -45,7 +45,7 @@ fn with_largest_source_errors(plan: &FramePlan, plans: &[FramePlan]) -> Predicte
         nodes_px: most(|predicted| predicted.nodes_px),
         rounding_px: most(|predicted| predicted.rounding_px),
         total_px: most(|predicted| predicted.total_px),
-        void_share: most(|predicted| predicted.void_share),
+        void_fraction: most(|predicted| predicted.void_fraction),
         source_error_obstacle: worst.and_then(|worst| worst.source_error_obstacle.clone()),
         probes: all().map(|predicted| predicted.probes).sum(),
         source_error_kept: all().all(|predicted| predicted.source_error_kept),

@@ -41,8 +41,8 @@ fn measured(reading: &BorderReading) -> f64 {
         let inside = (0..PLACES * PLACES * instants).map(|i| {
             let [x, y] =
                 [i % PLACES, i / PLACES % PLACES].map(|n| (f64::from(n) + 0.5) / f64::from(PLACES) - 0.5);
-            let share = (f64::from(i / (PLACES * PLACES)) + 0.5) / f64::from(instants) - 0.5;
-            lit(at + share * along + width_px * DVec2::new(x, y))
+            let fraction = (f64::from(i / (PLACES * PLACES)) + 0.5) / f64::from(instants) - 0.5;
+            lit(at + fraction * along + width_px * DVec2::new(x, y))
         });
         (found.x - inside.sum::<f64>() / f64::from(PLACES * PLACES * instants)).powi(2)
     });
@@ -91,14 +91,16 @@ fn error_of_rays_is_that_of_drawn_borders() {
     let part = |k: u32, step: f64| (f64::from(k + 1) * step).fract();
     let all: Vec<(DVec2, f64)> = (0..EXACT)
         .map(|i| {
-            let [x, y, share] = [1.0 / f64::from(EXACT), 0.754_877_666_246_693, 0.569_840_290_998_053]
+            let [x, y, fraction] = [1.0 / f64::from(EXACT), 0.754_877_666_246_693, 0.569_840_290_998_053]
                 .map(|step| part(i, step));
-            (DVec2::new(x, y) - 0.5, share)
+            (DVec2::new(x, y) - 0.5, fraction)
         })
         .collect();
     let lit = |places: &[(DVec2, f64)], normal: DVec2, along: f64, at: f64| {
-        let lit =
-            places.iter().filter(|(place, share)| place.dot(normal) + along * (share - 0.5) < at).count();
+        let lit = places
+            .iter()
+            .filter(|(place, fraction)| place.dot(normal) + along * (fraction - 0.5) < at)
+            .count();
         lit as f64 / places.len() as f64
     };
     for rays in [16, 32, 64, 128, 256] {

@@ -85,10 +85,10 @@ fn model_of(others: Vec<Mesh>, exposure_ms: f64, gain: f64, disocclusion: Disocc
 }
 
 #[test]
-fn a_roof_has_the_share_and_contrast_of_its_silhouette() {
+fn a_roof_has_the_fraction_and_contrast_of_its_silhouette() {
     let found = model(0.0, 1.0, Disocclusion::default()).plain(&sample_at(1.0), None);
     // 100 px a side: a band of 6 px along 400 px, of 120 000.
-    assert!((found.share / 0.02 - 1.0).abs() < 0.5, "{found:?}");
+    assert!((found.fraction / 0.02 - 1.0).abs() < 0.5, "{found:?}");
     assert!((found.contrast_dn - 255.0).abs() < 1e-3, "{found:?}");
     let half = model(0.0, 0.5, Disocclusion::default()).plain(&sample_at(1.0), None);
     assert_eq!((half.contrast_dn, half.error_dn), (0.5 * found.contrast_dn, 0.5 * found.error_dn));
@@ -119,7 +119,7 @@ fn all_borders_of_thin_bars_are_counted_in_any_direction() {
         let expected = UNSURE_OF_ALL * margins::SILHOUETTES * margins::SILHOUETTES * 2.0 / 8.0;
         assert!((found.steps / expected - 1.0).abs() < 0.1, "{angle}: {} {expected}", found.steps);
         // Places 3 px apart along rows and columns see bars 2 px wide or miss them.
-        assert!(found.share > 0.75, "{angle}: {}", found.share);
+        assert!(found.fraction > 0.75, "{angle}: {}", found.fraction);
         assert_eq!(found.touching, 0.0);
     }
 }
@@ -182,9 +182,9 @@ fn rays_leave_borders_between_touching_meshes() {
 fn finer_samples_find_creases() {
     let border_pixels = BorderPixels::new([(1.0, [1.0, 0.0])].into_iter());
     let creases = SilhouetteModel {
-        share: 0.5,
+        fraction: 0.5,
         contrast_dn: 100.0,
-        disoccluded_share: 0.0,
+        disoccluded_fraction: 0.0,
         strips: 0.0,
         steps: 0.0,
         steps_at_pixel_spacing: 0.0,
@@ -223,9 +223,13 @@ fn strips_are_within_parallax_or_disoccluded() {
         found.at_silhouettes_dn < at_most_dn && found.at_silhouettes_dn > 0.03 * at_most_dn,
         "{found:?} {at_most_dn}"
     );
-    let hidden = model_with(Disocclusion { share: 1e-3, weighted_share: 1e-3, ..Disocclusion::default() });
+    let hidden =
+        model_with(Disocclusion { fraction: 1e-3, weighted_fraction: 1e-3, ..Disocclusion::default() });
     let added = (hidden.error_dn.powi(2) - found.error_dn.powi(2)) / 255_f64.powi(2);
-    assert!((added / (STRIPS * 1e-3) - 1.0).abs() < 1e-9 && hidden.disoccluded_share == 1e-3, "{hidden:?}");
+    assert!(
+        (added / (STRIPS * 1e-3) - 1.0).abs() < 1e-9 && hidden.disoccluded_fraction == 1e-3,
+        "{hidden:?}"
+    );
 }
 
 #[test]

@@ -27,8 +27,8 @@ impl DryRun<'_> {
             std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
         let inverse_depths = places.map(inverse_depth);
         let steps_between = |a: usize, b: usize| {
-            steps(inverse_depths[a], inverse_depths[b], |share| {
-                inverse_depth(places[a].lerp(places[b], share))
+            steps(inverse_depths[a], inverse_depths[b], |fraction| {
+                inverse_depth(places[a].lerp(places[b], fraction))
             })
         };
         LINES.iter().any(|&[a, b, c]| {

@@ -50,8 +50,8 @@ impl<'a> NinePoints<'a> {
     /// Neighbours along rows, columns and diagonals with a step of depth between them.
     pub fn steps(&self) -> Vec<Pair> {
         let step = |a: usize, b: usize| {
-            let between = |share: f64| {
-                let place = self.places[a].lerp(self.places[b], share);
+            let between = |fraction: f64| {
+                let place = self.places[a].lerp(self.places[b], fraction);
                 self.cast(place).map_or(0.0, |hit| hit.depth_m.recip())
             };
             steps(self.inverse_depth[a], self.inverse_depth[b], between).then_some([a, b])

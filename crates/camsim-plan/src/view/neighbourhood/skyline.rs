@@ -84,9 +84,9 @@ impl Skyline {
     pub fn line_length_px(&self, normal: Option<DVec2>) -> f64 {
         let Some(normal) = normal else { return self.across_px.iter().sum::<f64>() / ACROSS as f64 };
         let turn = ACROSS as f64 * normal.to_angle().rem_euclid(PI) / PI;
-        let (below, share) = (turn.floor(), turn.fract());
+        let (below, fraction) = (turn.floor(), turn.fract());
         let [below, above] = [below, below + 1.0].map(|turn| self.across_px[turn as usize % ACROSS]);
-        below + (above - below) * share
+        below + (above - below) * fraction
     }
 }
 

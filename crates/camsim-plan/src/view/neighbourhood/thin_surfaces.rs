@@ -185,7 +185,7 @@ impl<'a> PointLine<'a> {
     /// What lies between a point and the next.
     fn add_pair_to(&self, k: usize, sums: &mut CrossingSums) {
         let [from, to] = [k, k + 1].map(|k| self.hits[k].as_ref());
-        let between = |share: f64| self.cast(k as f64 + share).map_or(0.0, |hit| hit.depth_m.recip());
+        let between = |fraction: f64| self.cast(k as f64 + fraction).map_or(0.0, |hit| hit.depth_m.recip());
         let may = self.either(k, may_step);
         if may && steps(self.inverse_depths[k], self.inverse_depths[k + 1], between) {
             sums.count += 1;

@@ -128,10 +128,14 @@ fn row_times(painter: &Painter, viewport: &ImageViewport, camera: &camsim_core::
     let step = (height / 240).max(1);
     for y in (0..height).step_by(step as usize) {
         let t_s = mids.get(y as usize).copied().unwrap_or_default();
-        let share = if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 };
+        let fraction = if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 };
         let (top, bottom) =
             (viewport.screen(0.0, f64::from(y) - 0.5).y, viewport.screen(0.0, f64::from(y + step) - 0.5).y);
-        painter.rect_filled(Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
+        painter.rect_filled(
+            Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom),
+            0.0,
+            ramp_color(fraction),
+        );
     }
     for y in [0, height / 4, height / 2, 3 * height / 4, height.saturating_sub(1)] {
         let visible = painter.clip_rect().shrink(7.0);
@@ -153,7 +157,7 @@ fn error_scale(painter: &Painter, map: &ErrorMap, total_px: f64) {
         painter,
         [least, most],
         &format!("99 % of the frame's pixels within {total_px:.4} px"),
-        |share| share,
+        |fraction| fraction,
     );
 }
 
@@ -161,7 +165,7 @@ fn error_scale(painter: &Painter, map: &ErrorMap, total_px: f64) {
 fn depth_scale(painter: &Painter, range_m: Option<[f32; 2]>) {
     let ends = range_m
         .map_or_else(|| ["no".into(), "surface".into()], |range_m| range_m.map(|m| format!("{m:.3} m")));
-    color_scale(painter, ends, "planar depth, logarithmic", |share| 1.0 - share);
+    color_scale(painter, ends, "planar depth, logarithmic", |fraction| 1.0 - fraction);
 }
 
 /// Draws a colour scale with labels at its ends and a caption, in the lower left corner of the clip
@@ -183,12 +187,12 @@ fn color_scale(painter: &Painter, ends: [String; 2], caption: &str, color: impl 
     );
     let step = SCALE_SIZE[0] / f32::from(SCALE_STEPS);
     for i in 0..SCALE_STEPS {
-        let share = (f64::from(i) + 0.5) / f64::from(SCALE_STEPS);
+        let fraction = (f64::from(i) + 0.5) / f64::from(SCALE_STEPS);
         let rect = Rect::from_min_size(
             corner + vec2(left + f32::from(i) * step, 0.0),
             vec2(step + 0.5, SCALE_SIZE[1]),
         );
-        painter.rect_filled(rect, 0.0, ramp_color(color(share)));
+        painter.rect_filled(rect, 0.0, ramp_color(color(fraction)));
     }
     let middle = |galley: &egui::Galley| 0.5 * (SCALE_SIZE[1] - galley.size().y);
     for (offset, text) in [

@@ -81,8 +81,8 @@ impl ImageViewport {
         Some([inside(image_px.x, self.size_px[0])?, inside(image_px.y, self.size_px[1])?])
     }
 
-    /// Position as a share of the picture's size.
-    fn share(&self, position: Pos2) -> [f32; 2] {
+    /// Position as a fraction of the picture's size.
+    fn fraction(&self, position: Pos2) -> [f32; 2] {
         let image_px = (position - self.origin) / self.scale;
         [image_px.x / self.size_px[0].max(1) as f32, image_px.y / self.size_px[1].max(1) as f32]
     }
@@ -119,8 +119,8 @@ pub fn interact(
         return;
     };
     if response.dragged() && !is_captured && response.drag_delta() != Vec2::ZERO {
-        let centre = viewport.share(viewport.pane.center() - response.drag_delta());
-        (view.zoom, view.centre) = (Some(viewport.zoom()), centre.map(|share| share.clamp(-0.5, 1.5)));
+        let centre = viewport.fraction(viewport.pane.center() - response.drag_delta());
+        (view.zoom, view.centre) = (Some(viewport.zoom()), centre.map(|fraction| fraction.clamp(-0.5, 1.5)));
     }
     let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y / 200.0).exp());
     if response.contains_pointer() && (factor - 1.0).abs() > 1e-4 {
@@ -134,10 +134,10 @@ pub fn interact(
 /// The view zoomed by `factor` about a screen position.
 pub fn zoomed(view: &View, viewport: &ImageViewport, fixed: Pos2, factor: f32) -> View {
     let zoom = (viewport.zoom() * factor).clamp(ZOOM[0], ZOOM[1]);
-    let share = viewport.share(fixed);
+    let fraction = viewport.fraction(fixed);
     let from_middle = (fixed - viewport.pane.center()) * (viewport.pixels_per_point / zoom);
     let size = [viewport.size_px[0].max(1) as f32, viewport.size_px[1].max(1) as f32];
-    let centre = [share[0] - from_middle.x / size[0], share[1] - from_middle.y / size[1]];
+    let centre = [fraction[0] - from_middle.x / size[0], fraction[1] - from_middle.y / size[1]];
     View { zoom: Some(zoom), centre, ..view.clone() }
 }
 
@@ -196,12 +196,12 @@ mod tests {
         let cursor = pos2(300.0, 200.0);
         for factor in [1.5, 3.0, 0.4] {
             let before = ImageViewport::new(pane(), [64, 48], &view, 1e3);
-            let share = before.share(cursor);
+            let fraction = before.fraction(cursor);
             view = zoomed(&view, &before, cursor, factor);
-            let after = ImageViewport::new(pane(), [64, 48], &view, 1e3).share(cursor);
+            let after = ImageViewport::new(pane(), [64, 48], &view, 1e3).fraction(cursor);
             assert!(
-                (share[0] - after[0]).abs() < 1e-4 && (share[1] - after[1]).abs() < 1e-4,
-                "{share:?} {after:?}"
+                (fraction[0] - after[0]).abs() < 1e-4 && (fraction[1] - after[1]).abs() < 1e-4,
+                "{fraction:?} {after:?}"
             );
         }
     }

@@ -44,13 +44,14 @@ pub fn outermost<T>(
     let size_px = DVec2::new(f64::from(camera.size_px[0]), f64::from(camera.size_px[1]));
     let half_px = 0.5 * (size_px - 1.0);
     let to_border = (half_px / direction.abs().max(DVec2::splat(1e-12))).min_element();
-    let value_at = |share: f64| camera.unproject(half_px + share * to_border * direction).and_then(&evaluate);
-    let share = |step: u32| f64::from(step) / f64::from(STEPS);
-    let (step, mut best) = (0..=STEPS).rev().find_map(|step| Some((step, value_at(share(step))?)))?;
+    let value_at =
+        |fraction: f64| camera.unproject(half_px + fraction * to_border * direction).and_then(&evaluate);
+    let fraction = |step: u32| f64::from(step) / f64::from(STEPS);
+    let (step, mut best) = (0..=STEPS).rev().find_map(|step| Some((step, value_at(fraction(step))?)))?;
     if step == STEPS {
         return Some(best);
     }
-    let (mut low, mut high) = (share(step), share(step + 1));
+    let (mut low, mut high) = (fraction(step), fraction(step + 1));
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
         match value_at(middle) {

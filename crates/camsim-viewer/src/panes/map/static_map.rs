@@ -191,9 +191,9 @@ fn bounds(points: impl Iterator<Item = DVec2>, objects: impl Iterator<Item = [DV
 /// Heights in colours, lit from the north-west.
 fn relief(terrain: &Terrain, [low, high]: [DVec2; 2]) -> ColorImage {
     let height_m = |x: usize, y: usize| {
-        let share =
+        let fraction =
             DVec2::new(1.0 - (y as f64 + 0.5) / RELIEF_PX as f64, (x as f64 + 0.5) / RELIEF_PX as f64);
-        let ne = low + share * (high - low);
+        let ne = low + fraction * (high - low);
         terrain.down_at(ne.x, ne.y).map(|down_m| -down_m)
     };
     let heights: Vec<Option<f64>> =

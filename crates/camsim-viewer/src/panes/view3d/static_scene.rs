@@ -75,11 +75,11 @@ pub fn static_scene(ui: &Ui, sequence: &Sequence, map: &StaticMap) -> StaticScen
 impl StaticScene {
     /// The ground below a point, at the height of the nearest corner, NED.
     pub fn below(&self, ned_m: DVec3) -> Option<DVec3> {
-        let share = (ned_m.truncate() - self.bounds[0]) / (self.bounds[1] - self.bounds[0]);
-        let index = |share: f64| {
-            ((0.0..=1.0).contains(&share)).then(|| (share * GROUND_CELLS as f64).round() as usize)
+        let fraction = (ned_m.truncate() - self.bounds[0]) / (self.bounds[1] - self.bounds[0]);
+        let index = |fraction: f64| {
+            ((0.0..=1.0).contains(&fraction)).then(|| (fraction * GROUND_CELLS as f64).round() as usize)
         };
-        let (row, column) = (index(1.0 - share.x)?, index(share.y)?);
+        let (row, column) = (index(1.0 - fraction.x)?, index(fraction.y)?);
         let (corner, _) = (*self.ground.corners.get(row * self.ground.columns + column)?)?;
         Some(ned_m.truncate().extend(corner.z))
     }
@@ -96,11 +96,11 @@ fn ground(terrain: &Terrain, [low, high]: [DVec2; 2]) -> Surface {
         / GROUND_CELLS as f64;
     let spread = [spread.y.clamp(0.0, 1.0), spread.x.clamp(0.0, 1.0)];
     let corner = |index: usize| {
-        let share = DVec2::new(
+        let fraction = DVec2::new(
             1.0 - (index / columns) as f64 / GROUND_CELLS as f64,
             (index % columns) as f64 / GROUND_CELLS as f64,
         );
-        let ne = low + share * (high - low);
+        let ne = low + fraction * (high - low);
         let hit = terrain.intersect(DVec3::new(ne.x, ne.y, top), DVec3::Z, deep)?;
         let color = mean(&terrain.texture, hit.uv, spread);
         // Light from the north-west, 45 deg above the horizon.

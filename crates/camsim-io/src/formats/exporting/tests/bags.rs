@@ -160,9 +160,10 @@ fn euroc_has_the_imu_as_its_body() {
     // Its clock is 2 ms ahead, and the ground truth is by it; biases are those of the true time, 11.000001 of 510 ms
     // after the first row.
     assert_eq!(cells[0], 1_001_000_001.0);
-    let share = 11.000_001 / 510.0;
+    let fraction = 11.000_001 / 510.0;
     assert!(
-        (cells[11] - (0.1 + 0.1 * share)).abs() < 1e-12 && (cells[16] - (0.6 + 0.1 * share)).abs() < 1e-12
+        (cells[11] - (0.1 + 0.1 * fraction)).abs() < 1e-12
+            && (cells[16] - (0.6 + 0.1 * fraction)).abs() < 1e-12
     );
     // The IMU's clock is 2 ms ahead, the picture 5 ms old.
     let chain = file("settings/openvins/kalibr_imucam_chain.yaml");
