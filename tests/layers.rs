@@ -8,7 +8,7 @@ use std::{
 };
 
 /// The crates with several modules.
-const CRATES: [&str; 9] = ["scenario", "core", "plan", "cpu", "gpu", "engine", "lab", "cli", "viewer"];
+const CRATES: [&str; 10] = ["scenario", "core", "plan", "cpu", "gpu", "engine", "io", "lab", "cli", "viewer"];
 /// Layers of the planner, from the lowest to the highest.
 const LAYERS: [&str; 10] = [
     "ir",

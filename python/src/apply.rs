@@ -6,7 +6,7 @@ use camsim::{
         scenario::{Channel, Preset},
         temporal::{IdealGeometry, displacement::Twist},
     },
-    io::pictures::read_vignette,
+    io::raster::pictures::read_vignette,
 };
 use glam::{DQuat, DVec2, DVec3};
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};

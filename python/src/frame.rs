@@ -5,13 +5,11 @@ use std::path::PathBuf;
 use camsim::{
     core::{
         frame::{PlaneValues, RenderedFrame},
+        pose::wxyz,
         scenario::{Channel, OutputEncoding, PlaneKind},
     },
     engine::Finished,
-    io::{
-        columns::wxyz,
-        write::{self, SourceFrame},
-    },
+    io::write::{self, SourceFrame},
 };
 use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyDict};

@@ -1,6 +1,6 @@
 """Coordinate systems that terrain files may state, and control points for them, by pyproj (PROJ and its copy of the EPSG registry).
 
-Writes crates/camsim-io/src/terrain/crs/systems.csv (what camsim knows) and tests/data/crs_points.csv (what it is tested against).
+Writes crates/camsim-io/src/raster/crs/systems.csv (what camsim knows) and tests/data/crs_points.csv (what it is tested against).
 
     pip install pyproj && python scripts/goldens/crs_table.py
 """
@@ -104,7 +104,7 @@ def main():
         if len(parts) == 2 and parts[0] in projected and int(info.code) < 65536:
             rows.append(("compound", int(info.code), crs.name, f"{parts[0]} {parts[1]}", ""))
     head = "# Facts of the EPSG registry (IOGP, https://epsg.org), by scripts/goldens/crs_table.py: kind;code;name;definition;metres by which the datum's shift may be off\n"
-    with open(ROOT / "crates/camsim-io/src/terrain/crs/systems.csv", "w") as out:
+    with open(ROOT / "crates/camsim-io/src/raster/crs/systems.csv", "w") as out:
         out.write(head + "".join(";".join(map(str, row)) + "\n" for row in rows))
     with open(ROOT / "tests/data/crs_points.csv", "w") as out:
         out.write(f"# scripts/goldens/crs_table.py, pyproj {pyproj.__version__}, PROJ {pyproj.proj_version_str}\nepsg,x,y,lat_deg,lon_deg\n")

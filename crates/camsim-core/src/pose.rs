@@ -47,3 +47,9 @@ impl CameraPose {
         (rotation, other_from_ned * (self.position_ned_m - other.position_ned_m))
     }
 }
+
+/// Components of a quaternion, scalar first.
+#[must_use]
+pub fn wxyz(q: DQuat) -> [f64; 4] {
+    [q.w, q.x, q.y, q.z]
+}

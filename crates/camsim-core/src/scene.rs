@@ -37,7 +37,7 @@ pub use terrain::{
 };
 pub use texture::{
     Encoding, LUMINANCE, LUMINANCE_F64, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb,
-    linear_from_srgb_f64, srgb_from_linear, srgb_from_linear_f64,
+    linear_from_srgb_f64, luminance, srgb_from_linear, srgb_from_linear_f64,
 };
 pub use texture_tiles::{TILE_SIDE, TileGrid, TileSource, is_whole, tile_bytes};
 

@@ -3,10 +3,13 @@
 
 use std::{borrow::Cow, fmt::Write as _};
 
-use camsim_core::{mount::CameraPath, pose::CameraPose};
+use camsim_core::{
+    mount::CameraPath,
+    pose::{CameraPose, wxyz},
+};
 use glam::{DQuat, DVec3};
 
-use crate::write::Number;
+use crate::text::number::Number;
 
 mod lists;
 pub(crate) use lists::{T_NS, T_S, T_TRUE_NS};
@@ -196,12 +199,6 @@ pub fn csv_cell(text: &str) -> Cow<'_, str> {
         true => format!("\"{}\"", text.replace('"', "\"\"")).into(),
         false => text.into(),
     }
-}
-
-/// Components of a quaternion, scalar first.
-#[must_use]
-pub fn wxyz(q: DQuat) -> [f64; 4] {
-    [q.w, q.x, q.y, q.z]
 }
 
 /// Motion of the camera at one instant.

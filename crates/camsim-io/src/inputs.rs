@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::{
     gltf_file::referenced_files,
-    terrain::{files::terrain_files, sidecar_files},
+    raster::{files::terrain_files, sidecar_files},
 };
 
 /// Fingerprints of files by their paths.

@@ -12,7 +12,7 @@ use camsim_core::{
 
 use crate::{
     frame_file::{FrameFileError, exr_planes::read_exr},
-    pictures::decode_bytes,
+    raster::pictures::decode_bytes,
 };
 
 /// A kernel that cannot be used.

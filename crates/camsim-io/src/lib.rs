@@ -18,10 +18,9 @@
 //! | [`scenario_file`] | scenarios and camera files (TOML), `--set` |
 //! | [`formats`] | calibrations of and for other programs; output folders in their layouts |
 //! | [`flight_log`] | flight logs: CSV, TUM, EuRoC, GPX |
-//! | [`terrain`] | heights and ortho-images |
+//! | [`raster`] | heights, ortho-images, textures, grey images |
 //! | [`gltf_file`] | models |
 //! | [`board_file`] | calibration boards |
-//! | [`pictures`] | textures and grey images |
 //! | [`load`] | everything that a scenario names |
 //! | [`frame_file`] | RGB-D frames for `camsim apply` |
 //! | [`write`](mod@write) | frames and tables |
@@ -50,11 +49,10 @@ pub mod lens_table;
 pub mod load;
 pub mod manifest;
 pub mod merge;
-pub mod pictures;
 pub mod portable;
+pub mod raster;
 pub mod scenario_file;
 pub mod shell;
-pub mod terrain;
 pub mod write;
 
 #[cfg(test)]

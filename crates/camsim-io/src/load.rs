@@ -8,8 +8,8 @@ use crate::{
     gltf_file::{GltfError, MAX_RADIUS_M},
     kernel_file::{KernelFileError, load_kernel},
     lens_table::{LensTableError, load_lens_table},
-    pictures::{PictureError, read_vignette},
-    terrain::{TerrainFileError, TerrainSummary},
+    raster::pictures::{PictureError, read_vignette},
+    raster::{TerrainFileError, TerrainSummary},
 };
 use camsim_core::{
     auto_exposure::{ExposureError, ExposureTrack},

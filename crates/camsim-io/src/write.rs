@@ -55,7 +55,7 @@ mod encode;
 mod exr_file;
 mod frame_table;
 mod frames;
-mod numbers;
+mod lists;
 mod picture;
 mod png_file;
 mod raw_picture;
@@ -67,17 +67,17 @@ mod tracks;
 mod variations;
 mod video;
 
+pub use crate::text::number::Number;
+pub(crate) use crate::text::number::seconds;
 pub use atomic::{is_special, open_special, write_atomic};
 pub(crate) use atomic::{remove_all_temporaries, temporary_path, write_atomic_with};
 pub use channel_pictures::channel_pictures;
-pub use encode::{luminance, srgb8};
+pub use encode::srgb8;
 pub(crate) use exr_file::encode as encode_exr;
 pub use frame_table::{
     FRAMES_CSV, FrameRecord, FrameTable, SourceFrame, TableKind, frames_path, listed_frames,
 };
 pub use frames::{FrameFiles, FrameWriter, WriteSummary, unlisted_frame_files};
-pub use numbers::Number;
-pub(crate) use numbers::seconds;
 pub use picture::write_picture;
 pub(crate) use png_file::encode as encode_png;
 pub use png_file::{contact_sheet, palette_rgb8};

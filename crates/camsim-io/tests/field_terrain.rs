@@ -10,7 +10,7 @@ use camsim_core::{
     scenario::{Beyond, HeightReference, HeightUnit, TerrainSpec},
     scene::TexelForm,
 };
-use camsim_io::terrain::{LoadedTerrain, TerrainFileError, read_terrain};
+use camsim_io::raster::{LoadedTerrain, TerrainFileError, read_terrain};
 use glam::DVec3;
 
 fn field(name: &str) -> PathBuf {
@@ -316,7 +316,7 @@ fn ortho_image_that_contains_the_dem_gets_no_margin() {
 #[test]
 fn documentation_page_matches_the_tables() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/inputs/TERRAIN.md");
-    let page = camsim_io::terrain::documentation();
+    let page = camsim_io::raster::documentation();
     if std::env::var_os("CAMSIM_BLESS").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, &page).unwrap();

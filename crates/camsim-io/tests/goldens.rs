@@ -21,7 +21,7 @@ use camsim_core::{
     scene::{linear_from_srgb, srgb_from_linear},
     temporal::displacement,
 };
-use camsim_io::{frame_file::read_frame, pictures::read_gray_image};
+use camsim_io::{frame_file::read_frame, raster::pictures::read_gray_image};
 use glam::{DVec2, DVec3};
 use image::RgbaImage;
 

@@ -13,7 +13,7 @@ use camsim_core::scene::linear_from_srgb;
 use camsim_io::{
     frame_file::{FrameFile, read_frame, read_frame_set},
     load::load_sequence,
-    pictures::read_gray_image,
+    raster::pictures::read_gray_image,
     scenario_file::parse_scenario,
 };
 use image::{DynamicImage, ImageFormat};

@@ -11,8 +11,8 @@ use std::{
 
 use camsim_engine::{Engine, GpuError, RenderError};
 use camsim_io::{
-    flight_log::FlightLogError, formats::reading::CameraFileError, load::LoadError, pictures::PictureError,
-    scenario_file::ScenarioError, write::WriteError,
+    flight_log::FlightLogError, formats::reading::CameraFileError, load::LoadError,
+    raster::pictures::PictureError, scenario_file::ScenarioError, write::WriteError,
 };
 
 use crate::plot::PlotError;

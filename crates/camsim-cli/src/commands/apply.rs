@@ -10,7 +10,7 @@ use camsim_core::{
 use camsim_io::{
     frame_file::{FrameFile, FrameSet, read_frame_set},
     load::vignette_warnings,
-    pictures::read_vignette,
+    raster::pictures::read_vignette,
     scenario_file::read_checked_camera,
     write::write_picture,
 };

@@ -90,6 +90,12 @@ macro_rules! srgb_curve {
 srgb_curve!(f32, linear_from_srgb, srgb_from_linear, LUMINANCE);
 srgb_curve!(f64, linear_from_srgb_f64, srgb_from_linear_f64, LUMINANCE_F64);
 
+/// Rec. 709 luminance of linear RGB.
+#[must_use]
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    LUMINANCE[0] * rgb[0] + LUMINANCE[1] * rgb[1] + LUMINANCE[2] * rgb[2]
+}
+
 /// A texture, row-major from its top-left pixel, four bytes per pixel. Alpha 0 marks pixels without content.
 #[derive(Clone, PartialEq)]
 pub struct Texture {

@@ -21,6 +21,7 @@ pub(crate) mod poses;
 mod rig;
 pub(crate) mod selection;
 pub(crate) mod stated_size;
+mod syntax;
 pub(crate) mod timing;
 
 use format::{ReadCamera, Selected};

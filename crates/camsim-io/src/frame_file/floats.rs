@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::{DepthKind, DepthRows, FrameFileError, FrameSpec, images::failure};
-use crate::terrain::{
-    TerrainFileError, metres_per_unit_name,
-    raster::{Raster, is_tiff},
-    read_sidecar_mask, read_sidecar_tags,
+use crate::raster::{
+    TerrainFileError,
+    decoded::{Raster, is_tiff},
+    metres_per_unit_name, read_sidecar_mask, read_sidecar_tags,
 };
 
 /// The stored numbers of a depth picture.

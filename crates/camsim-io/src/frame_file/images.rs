@@ -10,7 +10,7 @@ use super::{
     exr_planes::{ExrPlane, read_exr},
     png_chunks::PngChunks,
 };
-use crate::pictures::largest_of_16_bits;
+use crate::raster::pictures::largest_of_16_bits;
 
 /// A colour picture as linear light.
 pub(super) struct Color {

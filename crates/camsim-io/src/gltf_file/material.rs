@@ -320,7 +320,7 @@ impl<'a> Materials<'a> {
         let decode_error = |reason: String| {
             error(format!("cannot be decoded as PNG, JPEG or WebP: {reason}; convert it to one of them"))
         };
-        let [width, height] = crate::pictures::size_of_bytes(&bytes).map_err(decode_error)?;
+        let [width, height] = crate::raster::pictures::size_of_bytes(&bytes).map_err(decode_error)?;
         if width.max(height) > MAX_SIDE_PX {
             return Err(error(format!(
                 "has {width}x{height} px, but a side can have at most {MAX_SIDE_PX}: make it smaller"
@@ -333,7 +333,7 @@ impl<'a> Materials<'a> {
                  support at most {COMMON_MAX_SIDE_PX} px on a side: consider a smaller image"
             ));
         }
-        let decoded = crate::pictures::decode_bytes(&bytes).map_err(decode_error)?;
+        let decoded = crate::raster::pictures::decode_bytes(&bytes).map_err(decode_error)?;
         let size_px = [decoded.width(), decoded.height()];
         let mut texture =
             Texture { size_px, rgba8: decoded.into_rgba8().into_raw(), encoding: Encoding::Srgb };

@@ -3,7 +3,7 @@
 use camsim_core::{camera::CameraModel, scenario::Beyond, scene::Aabb, sequence::Sequence};
 use glam::{DVec2, DVec3};
 
-use crate::terrain::TerrainSummary;
+use crate::raster::TerrainSummary;
 
 /// Number of frames that are sampled.
 const FRAMES: u64 = 25;

@@ -24,8 +24,8 @@ use super::{
 use crate::{
     board_file::read_board,
     gltf_file::{GltfOptions, MAX_RADIUS_M, read_moving_gltf},
-    pictures::read_texture,
-    terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
+    raster::pictures::read_texture,
+    raster::{HeightShift, TerrainSummary, read_terrain_in_light},
     text::wording::joined_notes,
 };
 

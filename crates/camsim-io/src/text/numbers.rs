@@ -1,8 +1,7 @@
 //! Numbers and matrices as the parsers of other programs want them.
 
+use camsim_core::pose;
 use glam::DQuat;
-
-use crate::columns;
 
 /// A number with a decimal point and without an exponent, as OpenCV's and ORB-SLAM3's readers want reals. YAML 1.1,
 /// which Kalibr's follows, takes `1e-5` for a text.
@@ -53,7 +52,7 @@ pub(crate) fn upright(q: DQuat) -> DQuat {
 
 /// Scalar first, not negative.
 pub(crate) fn wxyz(q: DQuat) -> [f64; 4] {
-    columns::wxyz(upright(q))
+    pose::wxyz(upright(q))
 }
 
 /// Scalar last, not negative.

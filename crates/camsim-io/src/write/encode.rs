@@ -2,12 +2,7 @@
 
 use std::sync::LazyLock;
 
-use camsim_core::scene::{LUMINANCE, linear_from_srgb_f64, srgb_from_linear_f64};
-
-/// Rec. 709 luminance of linear RGB.
-pub fn luminance(rgb: [f32; 3]) -> f32 {
-    LUMINANCE[0] * rgb[0] + LUMINANCE[1] * rgb[1] + LUMINANCE[2] * rgb[2]
-}
+use camsim_core::scene::{linear_from_srgb_f64, srgb_from_linear_f64};
 
 /// Nearest 8-bit code; NaN gives 0.
 pub(super) fn code8(value: f32) -> u8 {

@@ -2,7 +2,7 @@
 
 use std::{io::Cursor, path::Path};
 
-use camsim_core::{frame::RenderedFrame, scenario::OutputEncoding};
+use camsim_core::{frame::RenderedFrame, scenario::OutputEncoding, scene::luminance};
 use image::{
     ExtendedColorType, ImageEncoder,
     codecs::png::{CompressionType, FilterType, PngEncoder},
@@ -10,7 +10,7 @@ use image::{
 
 use super::{
     WriteError,
-    encode::{code8, code16, luminance, srgb8},
+    encode::{code8, code16, srgb8},
 };
 
 /// Encodes colour: RGBA of 8 or 16 bits, or luminance without alpha for the `luma` encodings.

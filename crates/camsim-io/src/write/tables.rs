@@ -2,7 +2,7 @@
 
 use camsim_core::{frame::RowRecord, scene::SceneObject};
 
-use super::numbers::seconds;
+use super::seconds;
 use crate::columns::{Columns, T_S, TableRow};
 
 /// Name of the table of the platform's motion.

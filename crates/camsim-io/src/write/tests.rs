@@ -150,7 +150,10 @@ fn png_has_the_configured_encoding() {
             image::DynamicImage::ImageLuma16(read) => {
                 let p = &expected[160..163];
                 assert!(
-                    (f32::from(read.as_raw()[40]) - 65535.0 * luminance([p[0], p[1], p[2]])).abs() <= 0.6
+                    (f32::from(read.as_raw()[40])
+                        - 65535.0 * camsim_core::scene::luminance([p[0], p[1], p[2]]))
+                    .abs()
+                        <= 0.6
                 );
             }
             _ => {}

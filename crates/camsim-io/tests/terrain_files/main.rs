@@ -12,7 +12,7 @@ mod sidecar;
 use std::path::{Path, PathBuf};
 
 use camsim_core::scenario::TerrainSpec;
-use camsim_io::terrain::{LoadedTerrain, TerrainFileError, read_terrain};
+use camsim_io::raster::{LoadedTerrain, TerrainFileError, read_terrain};
 use glam::DVec3;
 
 /// A file made by GDAL: scripts/goldens/terrain_rasters.py.

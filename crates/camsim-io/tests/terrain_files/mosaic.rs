@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camsim_core::scenario::{FileList, TerrainSpec};
-use camsim_io::terrain::LoadedTerrain;
+use camsim_io::raster::LoadedTerrain;
 
 use super::{
     color, height_m, pixels,

@@ -1,7 +1,7 @@
 //! Ortho-images: encodings, bands, white level, orientation.
 
 use camsim_core::scenario::TerrainSpec;
-use camsim_io::{pictures::read_texture, terrain::LoadedTerrain};
+use camsim_io::raster::{LoadedTerrain, pictures::read_texture};
 
 use super::{
     color, gdal_file, pixels,

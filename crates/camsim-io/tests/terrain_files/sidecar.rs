@@ -31,7 +31,7 @@ fn ascii_grid_is_read() {
     // Rows run south; the centre is (20, 15) m from the corner.
     let expected = [46.953_664_2, 9.000_262_8];
     let centre_deg =
-        |loaded: &camsim_io::terrain::LoadedTerrain| loaded.summary.centre_rad.map(f64::to_degrees);
+        |loaded: &camsim_io::raster::LoadedTerrain| loaded.summary.centre_rad.map(f64::to_degrees);
     let corner_deg = centre_deg(&corner);
     assert!((0..2).all(|k| (corner_deg[k] - expected[k]).abs() < 2e-6), "{corner_deg:?}");
     // The same grid by pixel centre, in capitals, with a byte-order mark, CRLF, and values across lines.
@@ -157,7 +157,7 @@ fn srtm_tile_is_placed_by_its_name() {
     };
     let loaded = read(&heights("N47E008.hgt")).unwrap();
     assert_eq!([[0, 2], [5, 0], [4, 3]].map(|post| height_m(&loaded, post)), [Some(2.0), Some(-5.0), None]);
-    let degrees = |loaded: &camsim_io::terrain::LoadedTerrain| {
+    let degrees = |loaded: &camsim_io::raster::LoadedTerrain| {
         [loaded.summary.south_west_rad, loaded.summary.north_east_rad]
             .map(|corner| corner.map(f64::to_degrees))
     };

@@ -156,7 +156,7 @@ pub fn in_memory(
 /// The file of the data folder cannot be read.
 pub fn target(setup: &Setup<'_>, width_m: f64) -> Result<Arc<Scene>, ReproduceError> {
     let texture = match setup.data_file("camsim/acircles_pattern-patternsX-towards-imageTop(North).gif") {
-        Some(path) => camsim_io::pictures::read_texture(&path, camsim_core::scene::Encoding::Srgb)?,
+        Some(path) => camsim_io::raster::pictures::read_texture(&path, camsim_core::scene::Encoding::Srgb)?,
         None => circle_grid::texture(),
     };
     Ok(Arc::new(circle_grid::scene(texture, width_m)))

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use camsim_core::{
+    pose::wxyz,
     scenario::Face,
     scene::{self, ModelLod, SceneLods, TerrainTiles, TexelForm, tile_bytes},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
 use camsim_engine::Engine;
-use camsim_io::{columns::wxyz, load::Loaded, terrain::TerrainSummary, write::SourceFrame};
+use camsim_io::{load::Loaded, raster::TerrainSummary, write::SourceFrame};
 use camsim_plan::{FramePlan, LevelOfDetail, Placement, PlanSummary, Planner};
 use serde::Serialize;
 

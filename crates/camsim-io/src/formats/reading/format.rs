@@ -7,8 +7,8 @@ use super::key_table::{KeyRow, TableLeaves, leaves};
 use super::other_text;
 use super::poses::Extrinsics;
 use super::selection::{CameraEntry, single};
+use super::syntax::LENS_DATABASE;
 use crate::text::document::{Document, KeyProblem, find};
-use crate::text::syntax::LENS_DATABASE;
 
 /// A format of calibrations that can be read.
 pub(crate) struct Reader {

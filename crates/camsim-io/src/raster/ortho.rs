@@ -10,19 +10,18 @@ use camsim_core::{
 use super::{
     TerrainFileError,
     crs::Crs,
+    decoded::{Raster, is_tiff},
     dem::Dem,
     files,
     geo_tags::{GeoKeys, GeoTags},
     georeference::Affine,
-    grid_tiles,
-    raster::{Raster, is_tiff},
-    sidecar,
+    grid_tiles, sidecar,
     stated_crs::StatedCrs,
     tiff_file::gdal_translate,
     tile::read_georeference,
 };
 use crate::{
-    pictures::{PictureError, StoredPicture, read_stored},
+    raster::pictures::{PictureError, StoredPicture, read_stored},
     text::wording::joined_notes,
 };
 
@@ -109,7 +108,7 @@ impl Ortho {
         let path = path.as_path();
         let Some(model_from_pixel) = model_from_pixel else {
             if let Some(orientation) = geo.orientation {
-                texture = crate::pictures::oriented(texture, orientation);
+                texture = crate::raster::pictures::oriented(texture, orientation);
             }
             notes.extend(geo.notes);
             notes.extend(stretched(texture.size_px, dem));

@@ -4,12 +4,12 @@ use std::{io::Read, path::Path};
 
 use super::{
     TerrainFileError,
+    decoded::{Raster, is_tiff},
     geo_tags::{GeoKeys, GeoTags},
     georeference::Affine,
-    raster::{Raster, is_tiff},
     tiff_file::{Image, SampleType},
 };
-use crate::pictures::PictureError;
+use crate::raster::pictures::PictureError;
 
 /// Formats of heights and their detection.
 pub(crate) const FORMATS: &[(&str, &str)] = &[

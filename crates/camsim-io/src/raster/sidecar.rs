@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{TerrainFileError, geo_tags::GeoTags, metadata::Metadata, raster::Raster};
+use super::{TerrainFileError, decoded::Raster, geo_tags::GeoTags, metadata::Metadata};
 
 /// Sidecar files: name, content, treatment.
 pub(crate) const SIDECARS: &[(&str, &str, &str)] = &[
@@ -93,7 +93,7 @@ pub(crate) fn read_sidecar_tags(path: &Path, geo: &mut GeoTags) -> Result<(), Te
 pub(crate) fn read_sidecar_mask(
     path: &Path,
     raster: &mut Raster,
-) -> Result<(), crate::pictures::PictureError> {
+) -> Result<(), crate::raster::pictures::PictureError> {
     let mask = with_suffix(path, ".msk");
     if mask.is_file() { raster.apply_mask_file(&mask) } else { Ok(()) }
 }

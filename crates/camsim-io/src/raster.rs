@@ -4,6 +4,7 @@ mod arc_prj;
 mod bands;
 mod citations;
 mod crs;
+pub(crate) mod decoded;
 mod dem;
 mod descriptions;
 mod documentation;
@@ -15,7 +16,7 @@ mod height_files;
 mod height_unit;
 mod metadata;
 mod ortho;
-pub(crate) mod raster;
+pub mod pictures;
 mod shaded_relief;
 mod sidecar;
 mod stated_crs;
@@ -39,7 +40,7 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use crate::{pictures::PictureError, text::wording::range};
+use crate::{raster::pictures::PictureError, text::wording::range};
 pub use documentation::documentation;
 pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
 pub(crate) use units::metres_per_unit_name;

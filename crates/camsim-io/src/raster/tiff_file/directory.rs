@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::tag;
-use crate::pictures::PictureError;
+use crate::raster::pictures::PictureError;
 
 /// Largest number of directories.
 const MAX_DIRECTORIES: usize = 4096;

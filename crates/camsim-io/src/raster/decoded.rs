@@ -14,7 +14,7 @@ use super::{
     geo_tags::GeoTags,
     tiff_file::{Directory, Image, SampleType, TiffFile, gdal_translate, tag},
 };
-use crate::pictures::PictureError;
+use crate::raster::pictures::PictureError;
 
 /// A decoded raster.
 pub(crate) struct Raster {
@@ -267,7 +267,7 @@ impl Raster {
                 "grey values must be unsigned of at most 16 bits, or floats",
             ));
         }
-        Ok(crate::pictures::gray_from_texture(&self.to_texture(path, Encoding::Linear)?))
+        Ok(crate::raster::pictures::gray_from_texture(&self.to_texture(path, Encoding::Linear)?))
     }
 }
 

@@ -4,10 +4,10 @@
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
-use super::document::{Document, SyntaxProblem};
+use super::other_text;
 use crate::formats::colmap::read as colmap;
-use crate::formats::reading::other_text;
 use crate::formats::ros::ini as ros_ini;
+use crate::text::document::{Document, SyntaxProblem};
 
 impl Document {
     /// Detects the syntax by the first characters: `<` is XML, `{` JSON, `[image]` ROS's `.ini`, a camera

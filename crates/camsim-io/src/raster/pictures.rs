@@ -6,14 +6,13 @@ use std::path::{Path, PathBuf};
 use camsim_core::{
     photometric::{GrayImage, vignette_part},
     scenario::CameraSpec,
-    scene::{Encoding, Texture},
+    scene::{Encoding, Texture, luminance},
 };
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
 
 use crate::{
+    raster::decoded::{Raster, is_tiff, max_decoded_bytes},
     similar_file::suggestion,
-    terrain::raster::{Raster, is_tiff, max_decoded_bytes},
-    write::luminance,
 };
 
 /// Why a picture cannot be read.
