@@ -1,6 +1,9 @@
 //! Tables of numbers from numpy and to it.
 
-use camsim::io::columns::{Column, Get, TableRow, wxyz};
+use camsim::{
+    core::pose::wxyz,
+    io::columns::{Column, Get, TableRow},
+};
 use glam::DVec3;
 use numpy::{
     Element, IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,

@@ -93,7 +93,7 @@ pub enum Preset {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
 #[serde(rename_all = "kebab-case")]
 pub enum Silhouettes {
-    /// `plain` if it is expected to keep `max_error_dn`, otherwise `rays`.
+    /// The cheaper of `plain` and `rays` that is expected to keep `max_error_dn`; `plain` if that is 16 or more.
     #[default]
     Auto,
     /// As elsewhere: taps in the ideal frame, each of whose pixels shows one surface.
