@@ -264,6 +264,11 @@ fn no_function_of_the_planner_is_long_without_a_reason() {
             if !is_function {
                 continue;
             }
+            // A declaration in a trait has no body.
+            let head = lines[first..].iter().find(|line| line.ends_with(['{', ';']));
+            if head.is_none_or(|line| line.ends_with(';')) {
+                continue;
+            }
             let end = format!("{indent}}}");
             let Some(length) = lines[first..].iter().position(|line| *line == end) else { continue };
             let has_reason = lines[first..first + length].iter().any(|line| line.contains(REASON));

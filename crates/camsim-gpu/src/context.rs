@@ -2,12 +2,7 @@
 
 use std::sync::{Arc, LazyLock, Mutex};
 
-use camsim_core::{scene::SceneBatches, sequence::Sequence};
-
-use crate::{
-    adapter::{Adapter, AdapterChoice, AdapterLimits, AdapterSession, AdapterSummary, GpuError},
-    session::GpuSession,
-};
+use crate::adapter::{AdapterChoice, AdapterSummary, GpuError};
 
 fn summary_of(info: &wgpu::AdapterInfo) -> AdapterSummary {
     let kind = match info.device_type {
@@ -203,37 +198,5 @@ impl GpuContext {
             limit,
             fix,
         })
-    }
-}
-
-impl Adapter for GpuContext {
-    fn summary(&self) -> &AdapterSummary {
-        &self.adapter
-    }
-
-    fn limits(&self) -> AdapterLimits {
-        AdapterLimits {
-            is_software: self.is_software,
-            max_picture_px: self.max_picture_px,
-            max_side_px: self.max_side_px(),
-            max_storage_bytes: self.max_storage_bytes(),
-        }
-    }
-
-    fn limit_pictures(&mut self, max_side_px: u32) {
-        self.max_picture_px = max_side_px.min(self.max_side_px());
-    }
-
-    fn set_pixels_per_thread(&mut self, pixels: u32) {
-        self.pixels_per_thread = pixels.clamp(1, 4096);
-    }
-
-    fn session<'a>(
-        &'a self,
-        sequence: &Sequence,
-        meshes: Arc<SceneBatches>,
-        truth: bool,
-    ) -> Result<Box<dyn AdapterSession + 'a>, GpuError> {
-        Ok(Box::new(GpuSession::new(self, sequence, meshes, truth)?))
     }
 }

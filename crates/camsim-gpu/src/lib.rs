@@ -19,6 +19,7 @@
 #![warn(missing_docs)]
 
 pub mod context;
+mod engine_adapter;
 pub mod ideal;
 pub mod layout;
 pub mod recorder;
