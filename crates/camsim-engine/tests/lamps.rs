@@ -76,7 +76,7 @@ fn small_lamps_have_their_light() {
         for side_px in SIDES_PX {
             let sequence = lamps(side_px, streak_px, above_m, |_| {});
             let exact = Oracle::new(sequence.clone()).expect("an oracle");
-            let exact = fractions(&exact.render(0, &RenderOptions::default()).color_rgba(), side_px);
+            let exact = fractions(exact.render(0, &RenderOptions::default()).color_rgba(), side_px);
             eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, reference: {exact:.3?}");
             // Its samples are 1024 a pixel: 256 in all meet a lamp of half a pixel, with 6 % for random ones.
             assert!(worst(&exact) < 0.08, "{side_px} {streak_px} {above_m}: {exact:?}");

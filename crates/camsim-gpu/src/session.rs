@@ -240,7 +240,7 @@ impl GpuSession<'_> {
             let target = &self.targets[last_ideal.target].ideal;
             last_ideal.copy = Some(self.copies.record(self.gpu, &mut recorder, target, &job.plan.ideal));
         }
-        Ok(recorder.finish()?)
+        recorder.finish()
     }
 
     /// Pass 1, only when the lens has changed: the lens map.

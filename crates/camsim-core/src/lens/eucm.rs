@@ -20,7 +20,6 @@ pub(super) const FACTS: ModelFacts = ModelFacts {
     point: "`(x, y) / (alpha d + (1 - alpha) z)`, `d = sqrt(beta (x^2 + y^2) + z^2)`",
     authority: "arXiv 1807.08957; Kalibr and basalt `eucm`; COLMAP `EUCM`",
     field: "360",
-    ..ModelFacts::NONE
 };
 
 /// `sin t / (alpha d + (1 - alpha) cos t)`, `d = sqrt(beta sin^2 t + cos^2 t)`.

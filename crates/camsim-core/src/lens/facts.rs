@@ -6,6 +6,9 @@ use glam::DMat2;
 
 use super::{direction::DirectionFormula, radial::RadialFormula};
 
+/// The values of a coefficient that a model is defined for: its name, the interval, the interval in words with a hint.
+pub(crate) type Domain = (&'static str, (Bound<f64>, Bound<f64>), &'static str);
+
 /// Facts of a lens model.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelFacts {
@@ -15,8 +18,8 @@ pub struct ModelFacts {
     pub(super) defaults: &'static [f64],
     /// What to do with more coefficients than these.
     pub fix: &'static str,
-    /// Coefficients that the model is not defined for all values of: name, values, and these in words with a hint.
-    pub(crate) ranges: &'static [(&'static str, (Bound<f64>, Bound<f64>), &'static str)],
+    /// Coefficients that the model is not defined for all values of.
+    pub(crate) ranges: &'static [Domain],
     /// How the lens is computed, from all coefficients.
     pub(super) shape: fn(&[f64]) -> Shape,
     /// Names in calibration files: letters and digits alone, in lower case.

@@ -226,7 +226,7 @@ fn renderer_output(
         color_rgba.iter_mut().for_each(|value| *value = half::f16::from_f32(*value).to_f32());
     }
     renderer.set_general_only(is_general);
-    let uniforms = frame_uniforms(plan, &sequence, case.coords_phase);
+    let uniforms = frame_uniforms(plan, sequence, case.coords_phase);
     let rows = RowTable::new(plan, &sequence.path);
     let (picture, truth) =
         renderer.reverse(&ReverseInputs { plan, uniforms: &uniforms, rows: &rows }, buffer);

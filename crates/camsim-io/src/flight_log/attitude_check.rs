@@ -42,7 +42,7 @@ pub(super) fn notes(log: &FlightLog, raw: &RawLog) -> Vec<Note> {
         false => tilted_angles(&attitudes),
     };
     let texts = [tilted, constant(&sample, &raw.rows)];
-    texts.into_iter().flatten().map(|text| Note::warning(text)).collect()
+    texts.into_iter().flatten().map(Note::warning).collect()
 }
 
 /// Fraction of attitudes in which an axis of the body points at least this far along down.

@@ -10,7 +10,7 @@ pub(crate) mod write;
 
 const OPENCV_FISHEYE: &str = "OPENCV_FISHEYE";
 
-/// Values of `camera_model`, with the keys of their coefficients.
+/// Values of `camera_model`, with the keys of their coefficients. Panoramas are read only.
 const LENSES: &[NamedLens] = &[
     NamedLens::new(OPENCV_FISHEYE, LensModel::KannalaBrandt, "k1 k2 k3 k4"),
     NamedLens::new("OPENCV", LensModel::BrownConrady, "k1 k2 p1 p2 k3"),

@@ -14,8 +14,10 @@ const CYCLES: [(f64, f64); 3] = [(0.6, 42.0), (2.3, 48.0), (8.9, 54.0)];
 /// The case with rows of Blender Cycles.
 const CYCLES_CASE: &str = "blender-plane";
 
-/// The columns of the comma-separated values.
-const COLUMNS: [(&str, fn(&Row) -> String); 24] = [
+/// A column of the comma-separated values: its name, and its cell of a row.
+type Column = (&'static str, fn(&Row) -> String);
+
+const COLUMNS: [Column; 24] = [
     ("case", |row| row.case.clone()),
     ("preset", |row| row.preset.to_owned()),
     ("width", |row| row.width.to_string()),

@@ -1,8 +1,11 @@
 //! nerfstudio's `transforms.json`. The centre of the first pixel is (0.5, 0.5) there.
 
+use camsim_core::scenario::LensModel;
+
 use super::LENSES;
 use crate::formats::named_lens::NamedLens;
 use crate::formats::writing::exported::{Content, Writer};
+use crate::formats::writing::lens_names::no_such_lens;
 use crate::formats::writing::{Calibration, CalibrationError, Intrinsics};
 use crate::text::numbers::real;
 
@@ -15,6 +18,9 @@ pub(crate) const WRITER: Writer =
 /// nerfstudio does not have the lens.
 pub(crate) fn model(camera: &Calibration) -> Result<(&'static str, String), CalibrationError> {
     let (lens, coefficients) = NamedLens::that_holds(LENSES, camera, "nerfstudio")?;
+    if lens.model == LensModel::Equirectangular {
+        return Err(no_such_lens(camera, "nerfstudio"));
+    }
     let Intrinsics { focal_px: [fx, fy], principal_px: [cx, cy], size_px: [w, h], .. } = camera.intrinsics;
     let shift = 0.5;
     let mut text = format!(
