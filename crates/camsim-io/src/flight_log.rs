@@ -65,11 +65,11 @@ mod mcap_file;
 mod message_columns;
 mod missing_columns;
 mod motive;
+mod page;
 mod position_columns;
 mod preamble;
 mod quaternions;
 mod receiver_logs;
-mod reference;
 mod row_selection;
 mod row_states;
 mod rows;
@@ -102,7 +102,7 @@ use crate::{
 };
 
 pub use error::{FlightLogError, LogProblem};
-pub use reference::reference;
+pub use page::page;
 
 /// The rows of a file before cleaning, with notes about them.
 #[derive(Clone, Debug, PartialEq)]

@@ -35,8 +35,8 @@ mod opensfm;
 mod openvins;
 mod orb_slam;
 mod pairs;
-mod reference;
 pub(crate) mod ros;
+mod sim_params;
 mod stmap;
 mod tum;
 mod vikit;
@@ -78,7 +78,7 @@ formats! {
     /// Formats of calibrations that can be read, in the order of detection.
     CameraFormat, Reader:
     /// XML of the paper's reference program.
-    Reference => reference::READER,
+    Reference => sim_params::READER,
     /// Agisoft Metashape, PhotoScan or Lens XML.
     Agisoft => agisoft::READER,
     /// Gyroflow lens profile JSON.

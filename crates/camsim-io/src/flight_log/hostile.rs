@@ -115,7 +115,7 @@ fn logs_md_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/inputs/LOGS.md");
     if std::env::var_os("CAMSIM_BLESS").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(&path, reference()).unwrap();
+        std::fs::write(&path, page()).unwrap();
     }
-    assert_eq!(std::fs::read_to_string(&path).unwrap(), reference(), "set CAMSIM_BLESS=1 to write it");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), page(), "set CAMSIM_BLESS=1 to write it");
 }

@@ -1,4 +1,4 @@
-//! Generates docs/reference/inputs/LOGS.md: `reference.md`, with the reader's own tables in it.
+//! Generates docs/reference/inputs/LOGS.md: `page.md`, with the reader's own tables in it.
 
 use super::{
     column_names::{KNOWN_NAMES, PREFIXES},
@@ -9,11 +9,11 @@ use super::{
 };
 
 /// The page, with a name in braces for each table.
-const PAGE: &str = include_str!("reference.md");
+const PAGE: &str = include_str!("page.md");
 
 /// Names, units, formats and rules of flight logs, as Markdown.
 #[must_use]
-pub fn reference() -> String {
+pub fn page() -> String {
     let columns = KNOWN_NAMES
         .iter()
         .map(|known| [known.quantity.to_owned(), codes(known.names), known.treatment.to_owned()]);
