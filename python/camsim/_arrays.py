@@ -59,7 +59,7 @@ def pair_of(values: Any, what: str, meaning: str) -> list[float]:
 
 
 def picture_of(values: ArrayLike, what: str) -> NDArray[np.float32]:
-    """A picture as height x width x channels of float32; integers become shares of their largest value."""
+    """A picture as height x width x channels of float32; integers become fractions of their largest value."""
     array: NDArray[Any] = np.asarray(values)
     if array.ndim == 2:
         array = array[:, :, np.newaxis]

@@ -217,7 +217,7 @@ def compare(a: ArrayLike | Path, b: ArrayLike | Path) -> Comparison:
     """Compares two pictures, as arrays or files, or all pictures of the same name in two folders.
 
     Arrays have shape (height, width) or (height, width, channels); a fourth channel is alpha. Integers are compared
-    as shares of their largest value, as those of PNG files are.
+    as fractions of their largest value, as those of PNG files are.
 
     >>> camsim.compare(rolling.color, sharp.color).psnr_db
     >>> camsim.compare("run-1/color", "run-2/color").rmse

@@ -139,19 +139,19 @@ impl Distribution {
     }
 }
 
-/// The number of the first of these shares, which need not sum to 1, that reaches a fraction `unit` of their sum.
-/// Those of fraction 0 are never chosen.
+/// The number of the first of these weights, which need not sum to 1, that reaches a fraction `unit` of their sum.
+/// Those of weight 0 are never chosen.
 #[must_use]
-pub fn choose(fractions: &[f64], unit: f64) -> usize {
-    let mut left = unit * fractions.iter().sum::<f64>();
-    for (i, fraction) in fractions.iter().enumerate() {
-        if left < *fraction {
+pub fn choose(weights: &[f64], unit: f64) -> usize {
+    let mut left = unit * weights.iter().sum::<f64>();
+    for (i, weight) in weights.iter().enumerate() {
+        if left < *weight {
             return i;
         }
-        left -= fraction;
+        left -= weight;
     }
     // Rounding may leave a rest.
-    fractions.iter().rposition(|fraction| *fraction > 0.0).unwrap_or(0)
+    weights.iter().rposition(|weight| *weight > 0.0).unwrap_or(0)
 }
 
 /// A number to 12 digits, as [`Distribution::quantile`] rounds.

@@ -82,7 +82,7 @@ impl Comparison {
         -20.0 * self.rmse.log10()
     }
 
-    /// Pooled comparison of a set of images: RMSE, share and counts over all, largest maximum, mean SSIM.
+    /// Pooled comparison of a set of images: RMSE, fraction and counts over all, largest maximum, mean SSIM.
     /// `None` for an empty set.
     pub fn pooled(set: &[Self]) -> Option<Self> {
         let pixels: u64 = set.iter().map(|c| c.pixels).sum();

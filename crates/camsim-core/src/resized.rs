@@ -54,7 +54,7 @@ impl Resizing {
             return Err(Problem {
                 key: "camera.resized".into(),
                 message:
-                    "has more than one of binning, scale and size_px, and each states the size; leave one of \
+                    "has more than one of binning, scale and size_px, and each states the size; keep one of \
                           them (crop_px may stand beside it)"
                         .into(),
             });

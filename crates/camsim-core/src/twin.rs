@@ -15,7 +15,7 @@ use crate::{
 /// The scenario whose frames are a twin's pictures, of number `instant` where the twin is a burst
 /// ([`TwinSpec::instants`]). It has neither twins nor tracks itself.
 ///
-/// The pictures of a burst have a noise of their own each, by the camera's name.
+/// Each picture of a burst has its own noise, seeded by the camera's name.
 ///
 /// # Errors
 /// A shutter that cannot be used.
@@ -103,7 +103,8 @@ fn exposure_fraction(k: u32, count: u32) -> f64 {
     (f64::from(k) + 0.5) / f64::from(count) - 0.5
 }
 
-/// Makes instants of exposures that begin all at once: the row times are those of a rolling shutter then.
+/// Turns a global reset, whose exposures begin together, into a rolling shutter with the same mid-exposures.
+/// `fraction` is where in the exposure the picture is taken, -0.5 to 0.5.
 fn without_reset(shutter: &mut ShutterSpec, size_px: [u32; 2], fraction: f64) {
     if shutter.reset == Reset::Global {
         // From row to row half a line, as far as mid-exposures are apart, and what their exposures differ by.

@@ -215,11 +215,9 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
         "cannot be combined with quality.preset = \"paper\", which looks the depth up once; leave it out"
             .into()
     });
-    check.require(
-        matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)),
-        "quality.key_frames",
-        || "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into(),
-    );
+    check.require(matches!(quality.key_frames, Auto::Auto | Auto::Value(1)), "quality.key_frames", || {
+        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
     check.require(
         [1, QualitySpec::default().frames_per_ideal].contains(&quality.frames_per_ideal),
         "quality.frames_per_ideal",

@@ -37,7 +37,7 @@ pub struct Column<R> {
     part: Option<Part>,
 }
 
-/// What not every table of a kind is about.
+/// Subjects that only some tables of a kind have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     /// Places on Earth.

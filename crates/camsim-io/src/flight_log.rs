@@ -8,7 +8,7 @@
 //! | `tum` | t s, x, y, z, qx, qy, qz, qw | see below |
 //! | `euroc` | t ns, x, y, z, qw, qx, qy, qz | see below; a first column with a decimal point is seconds |
 //!
-//! Further columns are ignored; the CSV formats may end after the position (then `flight.attitude = "track"`
+//! Columns without use are named in notes; the CSV formats may end after the position (then `flight.attitude = "track"`
 //! is needed). A header line, also as a comment, names the columns in any order and takes precedence over the
 //! table; it may name units, which are converted (`column_names`, `units`). Separators are commas, semicolons
 //! (then decimals may have commas), tabs or blanks; fields may stand in quotes; `#` and `%` begin comments;

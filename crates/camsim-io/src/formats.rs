@@ -1,6 +1,6 @@
 //! Files of other programs, by program: calibrations in (`read`), calibrations out (`write`), and output folders of
 //! `camsim render` in their layouts (`export`). Each has a row that says what it is: a `READER`, a `WRITER`, a `LAYOUT`;
-//! the lists are here. `import(export(x))` is x.
+//! the lists are here. What is exported reads back as the same camera.
 //!
 //! | module | has what they share |
 //! |---|---|

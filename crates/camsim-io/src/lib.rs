@@ -17,11 +17,12 @@
 //! |---|---|
 //! | [`scenario_file`] | scenarios and camera files (TOML), `--set` |
 //! | [`formats`] | calibrations of and for other programs; output folders in their layouts |
-//! | [`flight_log`] | flight logs: CSV, TUM, EuRoC, GPX |
+//! | [`flight_log`] | flight logs of all formats |
 //! | [`raster`] | heights, ortho-images, textures, grey images |
 //! | [`gltf_file`] | models |
 //! | [`board_file`] | calibration boards |
 //! | [`load`] | everything that a scenario names |
+//! | [`lens_table`], [`kernel_file`] | files of a camera: lens tables, kernels of the point spread |
 //! | [`frame_file`] | RGB-D frames for `camsim apply` |
 //! | [`write`](mod@write) | frames and tables |
 //! | [`columns`] | columns of the tables |

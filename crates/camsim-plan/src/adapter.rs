@@ -238,7 +238,7 @@ pub enum GpuError {
     NoDevice {
         /// Adapter name.
         adapter: String,
-        /// Error text of wgpu.
+        /// Error text of the programming interface.
         reason: String,
     },
     /// The device stopped working.

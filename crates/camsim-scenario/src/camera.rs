@@ -66,7 +66,7 @@ pub struct CameraSpec {
         max = MAX_CLOCK_OFFSET_MS,
         hint = "it is how much the camera's clock is ahead"
     )]
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub clock_offset_ms: f64,
     /// Position and orientation on the platform.
     pub mount: MountSpec,
@@ -147,11 +147,6 @@ impl CameraSpec {
     pub fn readout_ms(&self) -> f64 {
         self.shutter.readout_ms_of(self.size_px)
     }
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 /// Position and orientation of the camera on the platform.
@@ -331,10 +326,10 @@ pub struct ShutterSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_time_us: Option<f64>,
     /// Begin of the rows' exposures: one by one or at once.
-    #[serde(skip_serializing_if = "Reset::is_rolling")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub reset: Reset,
     /// Whether the readout may be longer than the period of a frame.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub allow_overlap: bool,
 }
 
@@ -350,12 +345,6 @@ pub enum Reset {
     Global,
 }
 
-impl Reset {
-    fn is_rolling(&self) -> bool {
-        *self == Self::Rolling
-    }
-}
-
 impl ShutterSpec {
     /// Time from the first row that is read to the last, milliseconds, of a picture of this size, by
     /// `readout_ms` or `line_time_us`.
@@ -368,11 +357,6 @@ impl ShutterSpec {
         };
         self.line_time_us.map_or(self.readout_ms, |us| 1e-3 * us * lines)
     }
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 /// Rows of a field, counted from 0.

@@ -40,7 +40,8 @@ pub enum Channel {
     /// Fraction of the pixel's area and exposure that its `object` has, 0 to 1; 0 without a ray.
     Coverage,
     /// Optical flow to frame i + `output.flow_step`, pixels: where that frame, at the time of its own rows,
-    /// shows the point that the pixel sees. With a state: seen, hidden, outside, several times.
+    /// shows the point that the pixel sees. With a state: 1 seen, 2 hidden, 3 outside,
+    /// 4 several times, 0 none.
     Flow,
     /// Optical flow to frame i - `output.flow_step`, pixels, with a state.
     FlowBack,
@@ -112,7 +113,7 @@ pub enum Check {
     Direction,
     /// No difference is allowed.
     Exact,
-    /// Difference of a fraction of a pixel, beside objects that no pixel around shows.
+    /// Absolute difference; larger where an object is in a pixel but in no pixel beside it.
     Fraction,
     /// Distance of displacements; their states are equal.
     Displacement,

@@ -131,3 +131,8 @@ impl Scenario {
         Self { flight, scene, ..Self::default() }
     }
 }
+
+/// Whether a value is that of its type, so that files leave it out.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

@@ -1,4 +1,4 @@
-//! Limits of keys that others than the keys need.
+//! Limits of keys that other modules use too.
 
 /// Largest width and height of a picture. GPUs of the last decade support 16384; twice that is a typing error.
 pub const MAX_SIDE_PX: u32 = 32_768;

@@ -23,17 +23,17 @@ pub struct OutputSpec {
     #[key(unit = "ns")]
     pub epoch_ns: u64,
     /// Time that `trajectory.csv` and `camera_trajectory.csv` cover.
-    #[serde(skip_serializing_if = "TrajectorySpan::is_frames")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub trajectory: TrajectorySpan,
     /// Pixel type of EXR colour.
     pub exr_pixel: ExrPixel,
     /// Compression of EXR files.
     pub exr_compression: ExrCompression,
     /// File format of the channel `raw`.
-    #[serde(skip_serializing_if = "RawFormat::is_default")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub raw_format: RawFormat,
     /// Encoding of `mp4` and `mkv`, by ffmpeg.
-    #[serde(skip_serializing_if = "VideoSpec::is_default")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub video: VideoSpec,
     /// Frames from one to the other of `flow` and `flow_back`.
     #[key(
@@ -47,7 +47,7 @@ pub struct OutputSpec {
     /// Instant of the picture that `flow_global` leads to.
     pub flow_instant: FlowInstant,
     /// Pictures of `object` and `class` in colour, in `object_palette` and `class_palette`.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub palette: bool,
     /// Points whose pixel `tracks.csv` has for every frame that sees them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,12 +82,6 @@ pub enum TrajectorySpan {
     Frames,
     /// All of `flight.window_s`.
     Flight,
-}
-
-impl TrajectorySpan {
-    fn is_frames(&self) -> bool {
-        *self == Self::Frames
-    }
 }
 
 impl OutputSpec {

@@ -93,7 +93,7 @@ pub struct LightSpec {
     #[key(default = 0.2, unit = "x", step = 0.005, min = 0.0, max = 1.0)]
     pub sky: f64,
     /// Whether terrain and models keep the sun from what is behind them.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub shadows: bool,
 }
 
@@ -211,7 +211,7 @@ pub struct PatternSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
     /// Whether the image repeats over the plane, without seams, to the horizon.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub repeat: bool,
 }
 
@@ -346,7 +346,7 @@ pub struct GltfSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
     /// What an object is: each copy, or its nodes or materials.
-    #[serde(skip_serializing_if = "ObjectsOf::is_default")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub objects: ObjectsOf,
     /// Classes by name of node (with all below it) or of material, in place of `class`.
     #[key(min = 1, max = u16::MAX, hint = "leave it out for no class", example = "{ roof = 4 }")]
@@ -368,12 +368,6 @@ pub enum ObjectsOf {
     Node,
     /// Each material, of each placed copy.
     Material,
-}
-
-impl ObjectsOf {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 /// Kinds of calibration boards.

@@ -48,19 +48,11 @@ pub struct TimingSpec {
     pub miss: Vec<u64>,
     /// Fraction of the other triggers that do not come.
     #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a fraction of the triggers")]
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub miss_probability: f64,
     /// Whose errors stamps have: the camera's or the trigger's.
-    #[serde(skip_serializing_if = "is_default")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub stamped_by: StampedBy,
-}
-
-fn is_zero(probability: &f64) -> bool {
-    *probability == 0.0
-}
-
-fn is_default(stamped_by: &StampedBy) -> bool {
-    *stamped_by == StampedBy::Camera
 }
 
 /// Who writes the stamps.

@@ -43,7 +43,7 @@ pub struct TwinSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignette: Option<bool>,
     /// Neither exposure, rolling shutter, lens, noise, vignette nor point spread.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "crate::is_default")]
     pub ideal: bool,
     /// Pictures in a burst for each frame, each without exposure. Left out: one picture of each frame.
     #[key(
@@ -88,10 +88,6 @@ pub enum BurstOver {
     /// From the mid-exposure of the first row to that of the last one, both included; each picture has a
     /// global shutter.
     Readout,
-}
-
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 impl TwinSpec {

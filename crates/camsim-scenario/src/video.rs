@@ -66,11 +66,6 @@ impl RawFormat {
             Self::Exr => "exr",
         }
     }
-
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 /// Encoding of videos.
@@ -90,10 +85,6 @@ pub struct VideoSpec {
 impl VideoSpec {
     /// Largest value of `crf`.
     pub const WORST_CRF: u32 = 51;
-
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 /// Encoders of videos.

@@ -93,7 +93,7 @@ fn install_from(context: &Context, folders: Vec<PathBuf>) {
     }
 }
 
-/// FontFile folders of the operating system.
+/// Font folders of the operating system.
 fn folders() -> Vec<PathBuf> {
     let folder_in =
         |variable: &str, below: &str| std::env::var_os(variable).map(|folder| Path::new(&folder).join(below));
@@ -103,8 +103,8 @@ fn folders() -> Vec<PathBuf> {
         &[]
     } else {
         &[
-            "/usr/fraction/fonts",
-            "/usr/local/fraction/fonts",
+            "/usr/share/fonts",
+            "/usr/local/share/fonts",
             "/run/host/fonts",
             "/run/current-system/sw/share/X11/fonts",
         ]
@@ -116,7 +116,7 @@ fn folders() -> Vec<PathBuf> {
     } else {
         vec![
             folder_in("XDG_DATA_HOME", "fonts"),
-            folder_in("HOME", ".local/fraction/fonts"),
+            folder_in("HOME", ".local/share/fonts"),
             folder_in("HOME", ".fonts"),
         ]
     };
@@ -222,6 +222,13 @@ mod tests {
     use eframe::egui::{FontId, RawInput};
 
     use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn fonts_are_where_distributions_put_them() {
+        let found = folders();
+        assert!(["/usr/share/fonts", "/usr/local/share/fonts"].iter().all(|one| found.contains(&one.into())));
+    }
 
     fn names(fonts: &[FontFile]) -> Vec<String> {
         fonts

@@ -35,7 +35,7 @@ pub(super) struct Settings {
     pub fraction_of_code: Vec<f32>,
     /// Largest fraction above black; where the full well or the largest number ends the range.
     pub largest_fraction: f64,
-    /// Fixed pattern, electrons and shares.
+    /// Fixed pattern, electrons and fractions.
     pub prnu: f32,
     pub dsnu_e: f32,
     pub row_offset_e: f32,

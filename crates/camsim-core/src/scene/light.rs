@@ -11,7 +11,7 @@
 //! Meshes interpolate the normals of their vertices and evaluate I for the result *without normalising it*: I
 //! then differs by at most `sun + sky / 2` times the difference of the normals, which bounds the error of the
 //! levels of detail. On the terrain, light is baked into the texture; in its shadows the texture is multiplied by
-//! the fraction of the light that is the sky's ([`Terrain::sky_fraction`](super::Terrain::sky_share)).
+//! the fraction of the light that is the sky's ([`Terrain::sky_fraction`](super::Terrain::sky_fraction)).
 
 use glam::{DMat3, DVec3};
 

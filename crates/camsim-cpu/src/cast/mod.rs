@@ -131,12 +131,12 @@ struct FrameCaster<'a> {
 #[derive(Debug, Default)]
 struct PixelScratch {
     hits: [Hits; SAMPLES],
-    fractions: Vec<TriangleShare>,
+    fractions: Vec<TriangleFraction>,
 }
 
 /// The samples of a pixel that show one triangle.
 #[derive(Clone, Copy, Debug)]
-struct TriangleShare {
+struct TriangleFraction {
     triangle: Triangle,
     /// A bit for each sample.
     samples: u8,
@@ -295,14 +295,14 @@ impl<'a> FrameCaster<'a> {
                         fraction.samples |= 1 << k;
                         fraction.sun += sun;
                     }
-                    None => fractions.push(TriangleShare { triangle, samples: 1 << k, sun, color: None }),
+                    None => fractions.push(TriangleFraction { triangle, samples: 1 << k, sun, color: None }),
                 }
             }
         }
         let mut color = |triangle: Triangle| {
             let fraction = fractions.iter_mut().find(|fraction| fraction.triangle == triangle)?;
             if fraction.color.is_none() {
-                fraction.color = self.share_color(fraction, middle_px);
+                fraction.color = self.fraction_color(fraction, middle_px);
             }
             fraction.color
         };
@@ -322,7 +322,7 @@ impl<'a> FrameCaster<'a> {
         (colors, [0, 1, 2, 3].map(|k: usize| self.inverse_depth(&hits[k])), seen)
     }
 
-    fn share_color(&self, fraction: &TriangleShare, middle_px: DVec2) -> Option<glam::Vec4> {
+    fn fraction_color(&self, fraction: &TriangleFraction, middle_px: DVec2) -> Option<glam::Vec4> {
         let places = (0..SAMPLES).filter(|k| fraction.samples & (1 << k) != 0).map(|k| SAMPLE_POSITIONS[k]);
         let mean = places.clone().sum::<DVec2>() / f64::from(fraction.samples.count_ones());
         let mesh = fraction.triangle.surface.checked_sub(1).map(|i| &self.shader.scene.meshes[i as usize]);

@@ -346,7 +346,7 @@ impl<const TEXELS: usize> TexelSpan<TEXELS> {
         Self { first: per_lane(|i| base[i] + begin[i]), weights }
     }
 
-    /// Position of a bilinear read that stands for a texel and the next one, and their covered share.
+    /// Position of a bilinear read that stands for a texel and the next one, and their covered fraction.
     fn between(&self, texel: usize) -> [Lanes; 2] {
         let second = self.weights.get(texel + 1).unwrap_or(&ZERO);
         let both = per_lane(|i| self.weights[texel][i] + second[i]);

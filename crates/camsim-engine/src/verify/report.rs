@@ -82,7 +82,7 @@ impl FrameReport {
 /// Errors, and whether no fault is among them: every value is that of a surface near its pixel's ray.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Kept<T> {
-    /// Whether there is none.
+    /// Whether no value is faulty.
     pub kept: bool,
     /// The errors; JSON has `null` for those that are not finite.
     #[serde(flatten)]
@@ -130,7 +130,7 @@ impl From<ErrorVerdict> for JudgedBy {
     }
 }
 
-/// Errors of a truth channel. `null` if sky and surface are confused.
+/// Errors of a truth channel. `p99` and `max` are `null` where one side alone is sky.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PlaneReport {
     /// The channel.

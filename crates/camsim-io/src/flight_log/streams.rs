@@ -17,7 +17,7 @@ use super::{
     sparse_rows, unused_keys,
 };
 
-/// A position and an attitude closer than this fraction a row.
+/// A position and an attitude closer than this share a row.
 const SAME_INSTANT_NS: i128 = 1_000_000;
 
 /// Samples of one stream. Times are nanoseconds; `line` counts messages.

@@ -80,7 +80,7 @@ impl TableRow for TrackRecord {
         plain("x_px", "0, 0 is the centre of the first pixel", Number(|row| row.sighting.seen.px.x)),
         plain("y_px", "likewise", Number(|row| row.sighting.seen.px.y)),
         plain("t_ns", "when the point is seen, on the clock of stamps", Whole(|row| row.t_ns)),
-        plain("depth_m", "planar, in the camera of then", Number(|row| row.sighting.seen.depth_m)),
+        plain("depth_m", "planar, in the camera at that instant", Number(|row| row.sighting.seen.depth_m)),
         plain("visible", "0 if a surface is in front of it", Flag(|row| row.sighting.is_visible)),
         plain("solutions", "lines of this point and frame", Index(|row| row.sighting.seen.solutions)),
     ];

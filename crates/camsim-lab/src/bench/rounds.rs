@@ -5,7 +5,7 @@
 //! number of its frames: it contains plan, poses, passes and read-back, no files. What the frames of a burst
 //! share, such as one ideal frame, is planned and drawn anew in each burst.
 //!
-//! All variants have equal fractions of the time budget. A variant leaves when its fraction is used, so slow ones
+//! All variants have equal parts of the time budget. A variant leaves when its part is used, so slow ones
 //! have few rounds and fast ones many. The common rounds of two variants are the first rounds of both.
 
 use std::{
@@ -176,7 +176,7 @@ mod tests {
         let rounds = |round_ms: f64| {
             (0..).take_while(|&round| limits.has_round(round, round_ms * round as f64, 10)).count()
         };
-        // The fraction is one second: 3 rounds of 2 s all the same, 4 rounds of 300 ms, at most 9 of 10 ms.
+        // The part of each is one second: 3 rounds of 2 s all the same, 4 rounds of 300 ms, at most 9 of 10 ms.
         assert_eq!([2000.0, 300.0, 10.0].map(rounds), [3, 4, 9]);
     }
 

@@ -3,7 +3,7 @@
 /// The predicted source error of a frame from pixel to pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
-    /// One a probe: some 430, or a quarter of them for a frame that shares its ideal frame, sampled_box over the
+    /// One a probe: some 430, or a quarter of them for a frame that shares its ideal frame, spread evenly over the
     /// pixels that have a ray.
     pub pixels: Vec<PixelError>,
     /// What is known of the frame as a whole only, and comes on top everywhere while the exposure lasts:

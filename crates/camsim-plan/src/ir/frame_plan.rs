@@ -111,7 +111,7 @@ pub struct FramePlan {
     /// Time that its passes are expected to take, roughly: milliseconds for pictures of 640x480 on two
     /// processor cores with llvmpipe, whatever machine this is. Plans are compared by it.
     pub price_ms: f64,
-    /// Part of `price_ms` that this frame's fraction of the ideal frame takes.
+    /// Part of `price_ms` that this frame's part of the ideal frame takes.
     pub ideal_price_ms: f64,
     /// The colour that its output pass makes, of a camera whose colours have a lens each; plans are those of green.
     pub primary: Option<Primary>,

@@ -98,7 +98,7 @@ pub struct SilhouetteError {
 pub struct Disocclusion {
     /// Fraction of the picture, over its area and exposure.
     pub fraction: f64,
-    /// Width of the strips, the mean over that share, pixels of the ideal frame.
+    /// Width of the strips, the mean over that fraction, pixels of the ideal frame.
     pub width_px: f64,
     /// Fraction of the picture in strips wider than `quality.max_error_px`.
     pub wide_fraction: f64,

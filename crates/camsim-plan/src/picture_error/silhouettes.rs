@@ -65,7 +65,7 @@ pub(crate) struct SilhouetteModel {
 
 impl SilhouetteModel {
     /// From the neighbourhoods of all probes, the ideal frame's pose, the plane that is nearest to what is
-    /// seen from there, the disocclusion, and the least share that pixels at silhouettes have.
+    /// seen from there, the disocclusion, and the least fraction that pixels at silhouettes have.
     pub fn new(
         Neighbourhoods { of_probes, skyline }: &Neighbourhoods,
         camera: &CameraModel,

@@ -164,7 +164,7 @@ enum ProbeView<'a> {
     Surface(TextureProbe<'a>),
 }
 
-/// Some of the probes, each standing for as many as it is taken for. Half of them are taken sampled_box, and half
+/// Some of the probes, each standing for as many as it is taken for. Half of them are taken evenly, and half
 /// by how much of what is hard to resample they show: the few houses on a lawn, or the few pixels that are
 /// much wider than the rest, may be most of the error.
 fn representative(probes: Vec<TextureProbe<'_>>) -> Vec<TextureProbe<'_>> {

@@ -15,7 +15,7 @@ use crate::{
 
 /// One probe in so many is tested for a silhouette, to estimate the fraction of those that are at one; not in
 /// step with the grid of 24 columns.
-const SHARE_STEP: usize = 5;
+const FRACTION_STEP: usize = 5;
 /// Phases of the exposure that the probes take turns in. On a shaking mount the middle and the ends may be
 /// whole periods apart, where nothing has moved: the last two then stand in no simple ratio to them.
 const PHASES: [f64; 5] = [0.0, -0.5, 0.5, -0.309, 0.191];
@@ -115,9 +115,9 @@ impl<'a> ExactSources<'a> {
         *probe.apart.get_or_init(|| self.dry_run.at_silhouette(&probe.probe, &probe.source, false))
     }
 
-    /// Fraction of the pixels at silhouettes: of one probe in [`SHARE_STEP`].
+    /// Fraction of the pixels at silhouettes: of one probe in [`FRACTION_STEP`].
     pub fn silhouette_fraction(&self) -> f64 {
-        let asked: Vec<&ProbeSource> = self.probes.iter().step_by(SHARE_STEP).collect();
+        let asked: Vec<&ProbeSource> = self.probes.iter().step_by(FRACTION_STEP).collect();
         let apart = asked
             .par_iter()
             .with_min_len(8)

@@ -47,7 +47,7 @@ impl ExposurePath {
     /// From end to end.
     pub const STRAIGHT: Self = Self { path: PathStage::Straight, stretches: 1, stride: 1 };
 
-    /// The path with more nodes; `None` where the path is missed by no more than its fraction of the tolerance,
+    /// The path with more nodes; `None` where the path is missed by no more than its part of the tolerance,
     /// and where there are as many as there may be.
     pub fn finer(self, miss_px: f64, budget: &ErrorBudget) -> Option<Self> {
         let path = PathStage::Quartic;
@@ -86,7 +86,7 @@ pub(crate) struct ExposedFrame<'a> {
 }
 
 impl ExposedFrame<'_> {
-    /// The path with the fewest nodes that is missed by no more than its fraction of the tolerance; `None` where
+    /// The path with the fewest nodes that is missed by no more than its part of the tolerance; `None` where
     /// the exposure does not show.
     pub fn path(&self, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> Option<ExposurePath> {
         self.shows(quality, skipped).then(|| self.path_within(&ErrorBudget::new(quality)))
@@ -109,7 +109,7 @@ impl ExposedFrame<'_> {
         true
     }
 
-    /// The path with the fewest nodes that is missed by no more than its fraction of a tolerance.
+    /// The path with the fewest nodes that is missed by no more than its part of a tolerance.
     pub fn path_within(&self, budget: &ErrorBudget) -> ExposurePath {
         let allowed_px = budget.exposure_path_px();
         if self.motion.blur_sagitta_px <= allowed_px {

@@ -41,7 +41,7 @@ pub enum ImageFormatArg {
     Png,
 }
 
-/// ApplyInputs of the frames of a folder, which must be equal for `--resume`. Paths are relative to the
+/// Inputs of the frames of a folder, which must be equal for `--resume`. Paths are relative to the
 /// folder.
 #[derive(Debug, Serialize)]
 struct ApplyInputs {

@@ -177,7 +177,7 @@ pub(super) struct ModelFacts {
     pub(super) tolerance_px: f64,
 }
 
-/// MemoryFacts for a terrain and its texture, bytes. The GPU holds only what is in sight, except for a
+/// Memory for a terrain and its texture, bytes. The GPU holds only what is in sight, except for a
 /// texture that is not tiled.
 #[derive(Serialize)]
 pub(super) struct MemoryFacts {

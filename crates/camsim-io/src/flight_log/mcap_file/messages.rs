@@ -4,7 +4,7 @@ use std::{collections::HashSet, sync::Arc};
 
 use super::cdr::Decoder;
 
-/// RosKind of a message.
+/// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in super::super) enum RosKind {
     Pose,

@@ -18,7 +18,7 @@ pub(super) enum Law {
     Number(Distribution),
     /// A list of independent numbers.
     Numbers(Vec<Distribution>),
-    /// One of these values, by their fractions.
+    /// One of these values, by their weights.
     Choice(Vec<Value>, Vec<f64>),
     /// The value that stands there, times a drawn one.
     Times(Box<Law>),

@@ -86,7 +86,7 @@ fn dirichlet(n: u32, x: Vec4) -> Vec4 {
     if n % 2 == 1 { mean } else { sign_of(near) * mean }
 }
 
-/// `n` samples sampled_box over stretches of `x` cycles.
+/// `n` samples evenly over stretches of `x` cycles.
 fn sampled_box(n: u32, x: Vec4) -> Vec4 {
     if n == 1 { Vec4::ONE } else { dirichlet(n, x / n as f32) }
 }
