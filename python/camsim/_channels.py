@@ -74,7 +74,7 @@ class Channels:
 
     @property
     def flow(self) -> NDArray[np.float32]:
-        """Optical flow to frame i + `output.flow_step`, pixels: where that frame, at the time of its own rows, shows the point that the pixel sees. With a state: seen, hidden, outside, several times. An array of float32, height x width x 3."""
+        """Optical flow to frame i + `output.flow_step`, pixels: where that frame, at the time of its own rows, shows the point that the pixel sees. With a state: 1 seen, 2 hidden, 3 outside, 4 several times, 0 none. An array of float32, height x width x 3."""
         return self._attribute("flow")
 
     @property
