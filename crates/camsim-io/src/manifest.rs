@@ -17,17 +17,13 @@ use thiserror::Error;
 use crate::{
     inputs::Inputs,
     portable::{portable_scenario, relative_to},
-    scenario_file::{VariationRecord, for_each_path},
+    scenario_file::{RELATIVE_PATHS, VariationRecord, for_each_path},
     write::{WriteError, write_atomic},
 };
 
 mod rig;
 
 pub use rig::RigManifest;
-
-/// Value of the key `paths` of `run.json`. Early versions have no such key, and paths relative to the working
-/// directory.
-pub const PATHS: &str = "relative to this file";
 
 /// Contents of `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,7 +34,7 @@ pub struct RunManifest {
     pub adapter: String,
     /// Seed of all random numbers, as in the scenario.
     pub seed: u64,
-    /// Base of the paths: [`PATHS`].
+    /// Base of the paths: [`RELATIVE_PATHS`].
     pub paths: String,
     /// Which variation of a scenario with `[randomize]` it is. `scenario` has its values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -166,7 +162,7 @@ impl RunManifest {
         let fail =
             |error: serde_json::Error| WriteError::Encode { path: path.clone(), message: error.to_string() };
         let portable = Self {
-            paths: PATHS.to_owned(),
+            paths: RELATIVE_PATHS.to_owned(),
             scenario: portable_scenario(&self.scenario, folder).map_err(fail)?,
             inputs: portable_inputs(&self.inputs, folder),
             ..self.clone()

@@ -33,6 +33,10 @@ pub use schema::{CAMERAS, ValueKind, find_key, keys, kinds};
 use tree::Tree;
 pub use tree::UNSET;
 
+/// Value of the key `paths` of `run.json`. Early versions have no such key, and paths relative to the working
+/// directory.
+pub const RELATIVE_PATHS: &str = "relative to this file";
+
 /// Why a scenario cannot be used.
 #[derive(Debug, Error)]
 pub enum ScenarioError {

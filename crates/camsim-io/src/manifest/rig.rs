@@ -4,8 +4,13 @@ use std::{collections::BTreeMap, path::Path};
 
 use camsim_core::scenario::Rig;
 
-use super::{PATHS, portable_inputs, write_runs};
-use crate::{inputs::Inputs, portable::portable_rig, scenario_file::VariationRecord, write::WriteError};
+use super::{portable_inputs, write_runs};
+use crate::{
+    inputs::Inputs,
+    portable::portable_rig,
+    scenario_file::{RELATIVE_PATHS, VariationRecord},
+    write::WriteError,
+};
 
 /// Contents of `run.json` in the folder of a rig, which has a folder with a `run.json` for each camera.
 #[derive(Clone, Debug)]
@@ -43,7 +48,7 @@ impl RigManifest<'_> {
             "version": self.version,
             "adapter": self.adapter,
             "seed": self.rig.first().seed,
-            "paths": PATHS,
+            "paths": RELATIVE_PATHS,
             "cameras": runs,
             "scenario": portable_rig(self.rig, folder).map_err(fail)?,
             "inputs": portable_inputs(&self.inputs, folder),

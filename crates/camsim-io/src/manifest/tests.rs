@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 use super::*;
-use crate::scenario_file::{parse_scenario, read_scenario};
+use crate::scenario_file::{RELATIVE_PATHS, parse_scenario, read_scenario};
 
 fn scenario(sets: &[(&str, &str)]) -> Scenario {
     let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
@@ -15,7 +15,7 @@ fn manifest(scenario: Scenario) -> RunManifest {
         version: "0.1.0".into(),
         adapter: "llvmpipe".into(),
         seed: scenario.seed,
-        paths: PATHS.to_owned(),
+        paths: RELATIVE_PATHS.to_owned(),
         variation: None,
         twin: None,
         scenario,

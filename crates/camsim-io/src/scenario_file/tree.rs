@@ -98,14 +98,12 @@ impl Tree {
             .map_err(|error| problem(format!("neither TOML nor JSON: {error}")))?;
         let Some(Value::Table(root)) = run.get("scenario").and_then(from_json) else {
             return Err(problem(
-                "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds \
-                    a \
+                "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds a \
                  scenario"
                     .into(),
             ));
         };
-        let is_portable =
-            run.get("paths").and_then(serde_json::Value::as_str) == Some(crate::manifest::PATHS);
+        let is_portable = run.get("paths").and_then(serde_json::Value::as_str) == Some(super::RELATIVE_PATHS);
         let locations =
             root.keys().map(|key| (key.clone(), KeyLocation::Run(path.into(), is_portable))).collect();
         Ok(Self { file: path.into(), root, locations })

@@ -12,8 +12,9 @@ use camsim_core::{
 use camsim_io::{
     frame_file::{FrameSet, list::FrameEntry},
     inputs,
-    manifest::{PATHS, check_resume_key, portable_inputs},
+    manifest::{check_resume_key, portable_inputs},
     portable::{relative_to, write_camera},
+    scenario_file::RELATIVE_PATHS,
     write::{FrameFiles, FrameWriter, frames_path, write_atomic},
 };
 use serde::Serialize;
@@ -115,7 +116,7 @@ pub(super) fn run(
         frames.iter().copied().filter(|&index| !(args.resume && files.exist(number(index)))).collect();
     let mut manifest = ApplyManifest {
         version: env!("CARGO_PKG_VERSION"),
-        paths: PATHS,
+        paths: RELATIVE_PATHS,
         apply: &inputs,
         frames: [frames.first().copied().unwrap_or(0), frames.last().map_or(0, |last| last + 1)],
         written: 0,

@@ -205,7 +205,7 @@ fn a_variation_reads_back_from_its_record() {
     let scenario = read(text).unwrap();
     for index in 0..200 {
         let variation = scenario.variation(index).unwrap();
-        let run = serde_json::json!({ "paths": crate::manifest::PATHS, "scenario": variation.rig.first() });
+        let run = serde_json::json!({ "paths": crate::scenario_file::RELATIVE_PATHS, "scenario": variation.rig.first() });
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("run.json");
         std::fs::write(&path, run.to_string()).unwrap();

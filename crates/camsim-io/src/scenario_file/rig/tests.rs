@@ -57,7 +57,7 @@ fn a_rig_is_written_and_read_back() {
     let run = folder.path().join("run.json");
     let tree = crate::portable::portable_rig(&rig, folder.path()).unwrap();
     assert!(tree.get("camera").is_none() && tree["cameras"][1]["name"] == "right", "{tree}");
-    let whole = serde_json::json!({ "paths": crate::manifest::PATHS, "scenario": tree });
+    let whole = serde_json::json!({ "paths": crate::scenario_file::RELATIVE_PATHS, "scenario": tree });
     fs::write(&run, whole.to_string()).unwrap();
     let read = read_rig(&run, &[("cameras.1.fps".into(), "7".into())], None).unwrap();
     assert_eq!((camera(&read, 1).fps, camera(&read, 0)), (7.0, camera(&rig, 0)));

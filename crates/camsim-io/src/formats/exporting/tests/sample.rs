@@ -15,8 +15,8 @@ use glam::{DQuat, DVec3};
 use tempfile::TempDir;
 
 use crate::columns::Columns;
-use crate::manifest::{PATHS, RunManifest};
-use crate::scenario_file::parse_scenario;
+use crate::manifest::RunManifest;
+use crate::scenario_file::{RELATIVE_PATHS, parse_scenario};
 use crate::write::{
     FrameFiles, FrameRecord, FrameTable, FrameWriter, SourceFrame, Stamped, TrackRecord, frames_path,
     trajectory_csv, write_atomic,
@@ -184,7 +184,7 @@ fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
         version: "0.1.0".into(),
         adapter: "none".into(),
         seed: scenario.seed,
-        paths: PATHS.to_owned(),
+        paths: RELATIVE_PATHS.to_owned(),
         variation: None,
         twin: None,
         scenario: scenario.clone(),
