@@ -183,10 +183,7 @@ fn glass(sequence: &mut Sequence) {
 
 /// A camera without times that stands still over the scene of another sequence.
 fn hover(over: &Sequence, pitch_deg: f64) -> Arc<Sequence> {
-    let state = BodyState {
-        position_ned_m: DVec3::new(0.0, 0.0, -150.0),
-        ..BodyState::default()
-    };
+    let state = BodyState { position_ned_m: DVec3::new(0.0, 0.0, -150.0), ..BodyState::default() };
     let trajectory = Trajectory::uniform(-1.0, 2.0, 1.0, vec![state]).expect("a trajectory");
     let mut camera = CameraSpec::default();
     camera.mount.angles_deg = [0.0, pitch_deg, 0.0];
