@@ -76,8 +76,9 @@ pub fn nearest_first(fraction: f64, count: usize) -> impl Iterator<Item = usize>
     })
 }
 
-/// First intersection of a ray at a fraction of the window, and the number of the ideal frame that shows it: the nearest
-/// one in time, or else the next one in which the intersection is visible. `hit` is that in one of `count` frames.
+/// First intersection of a ray at a fraction of the window, and the number of the ideal frame that shows it: the
+/// nearest one in time, or else the next one in which the intersection is visible. `hit` is that in one of `count`
+/// frames.
 pub fn first_visible(
     window_fraction: f64,
     count: usize,

@@ -1,8 +1,8 @@
 //! Output folders of `camsim render` in the layouts of other programs.
 //!
 //! An export is a pure function of an output folder: pictures are linked or copied as they are where readers take
-//! alpha and 16 bits, and else encoded again; tables are turned into the axes, quaternion orders, pixel origins and clocks that the reader expects. A page
-//! `README.md` in the export says which.
+//! alpha and 16 bits, and else encoded again; tables are turned into the axes, quaternion orders, pixel origins and
+//! clocks that the reader expects. A page `README.md` in the export says which.
 //!
 //! Frames are handled one at a time, so memory does not grow with their number, except for a few hundred bytes
 //! of their row in `frames.csv`.

@@ -62,7 +62,8 @@ fn write_source_error(predicted: &Predicted, f: &mut fmt::Formatter<'_>) -> fmt:
     let fraction = 100.0 * fraction;
     writeln!(
         f,
-        "  disocclusion: {fraction:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}"
+        "  disocclusion: {fraction:.4} % of the picture is hidden from the ideal frames, in strips of \
+         {width_px:.2} px{beside}"
     )
 }
 

@@ -119,7 +119,8 @@ pub(crate) fn timing(camera: &RunCamera) -> String {
         false => String::new(),
     };
     format!(
-        "{centre}; row (or column) y of N = {lines} is exposed {fraction} {apart_ms} ms later, read {direction}{growing}"
+        "{centre}; row (or column) y of N = {lines} is exposed {fraction} {apart_ms} ms later, read \
+         {direction}{growing}"
     )
 }
 

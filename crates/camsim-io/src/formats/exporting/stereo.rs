@@ -6,8 +6,8 @@ use glam::DVec3;
 use super::DatasetError;
 use super::run_folder::RunCamera;
 
-/// How far two cameras may be from a pair: pixels of the matrix, radians of the axes, fraction of the distance along the
-/// axis.
+/// How far two cameras may be from a pair: pixels of the matrix, radians of the axes, fraction of the distance
+/// along the axis.
 const TOLERANCE: f64 = 1e-6;
 
 /// How far the camera is to the right of and below the first one of its pair, in metres; 0 without a pair.

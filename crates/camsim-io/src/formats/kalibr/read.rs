@@ -13,8 +13,8 @@ use crate::text::document::{Document, KeyProblem, find, numbers, numbers_n, one_
 pub(crate) const POSE: &str =
     "pose relative to an IMU, whose axes are not the body's: `--body` or `--rig` applies it";
 const BETWEEN: &str = "pose relative to the camera before it: `--body` or `--rig` applies it";
-const OTHER_POSE: &str = "a pose under another name: as T_cam_imu, camera from IMU, or its inverse T_imu_cam, `--body` or \
-                          `--rig` applies it";
+const OTHER_POSE: &str = "a pose under another name: as T_cam_imu, camera from IMU, or its inverse T_imu_cam, `--body` \
+                          or `--rig` applies it";
 pub(crate) const OFFSET: &str = "clock offset between camera and IMU, s, which shifts all stamps: `--body` or `--rig` \
                       applies it";
 

@@ -177,8 +177,8 @@ fn judge_baselines(found: &mut Extrinsics, root: &Value, pose: &str, metres: f64
         let baseline_m = stated / per_metre;
         if (baseline_m - metres).abs() > most_off * metres {
             found.notes.push(format!(
-                "not applied: {key} = {stated}, a baseline of {baseline_m:.4} m: the cameras are {metres:.4} m apart by \
-                 {pose}, which is used; correct the wrong one"
+                "not applied: {key} = {stated}, a baseline of {baseline_m:.4} m: the cameras are {metres:.4} m \
+                 apart by {pose}, which is used; correct the wrong one"
             ));
         }
         found.applied.push(key.to_owned());

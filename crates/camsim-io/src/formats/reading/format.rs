@@ -161,8 +161,8 @@ pub(crate) fn unsupported_hint(document: &Document) -> Option<String> {
         return Some(text.to_owned());
     }
     if find(value, "IntrinsicMatrix").is_some() {
-        let text = "this is MATLAB's transposed matrix, whose pixels count from 1: write camera_matrix ([fx, 0, cx - 1, \
-                    0, fy, cy - 1, 0, 0, 1]), distortion_coefficients ([k1, k2, p1, p2, k3]), image_width and \
+        let text = "this is MATLAB's transposed matrix, whose pixels count from 1: write camera_matrix ([fx, 0, \
+                    cx - 1, 0, fy, cy - 1, 0, 0, 1]), distortion_coefficients ([k1, k2, p1, p2, k3]), image_width and \
                     image_height to a YAML file";
         return Some(text.to_owned());
     }
