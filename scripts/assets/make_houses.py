@@ -94,7 +94,7 @@ def roof(shape, x, z, eaves, ridge):
                 shape.face([below[k], below[n], top[n], top[k]], EAVES)
 
 
-def write_glb(shape, path):
+def write_glb(shape, path, generator="make_houses.py"):
     positions = b"".join(struct.pack("<3f", *point) for point, _ in shape.corners)
     # COLOR_0 is linear light.
     colors = b"".join(struct.pack("<4B", *(round(255 * c) for c in color), 255) for _, color in shape.corners)
@@ -105,10 +105,10 @@ def write_glb(shape, path):
     low, high = ([f([point[k] for point, _ in shape.corners]) for k in range(3)] for f in (min, max))
     parts = [(0, len(positions)), (len(positions), len(colors)), (len(positions) + len(colors), len(indices))]
     document = {
-        "asset": {"version": "2.0", "generator": "camsim scripts/assets/make_houses.py"},
+        "asset": {"version": "2.0", "generator": f"camsim scripts/assets/{generator}"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "name": "house"}],
+        "nodes": [{"mesh": 0, "name": path.stem}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}]}],
         "materials": [{"name": "painted", "pbrMetallicRoughness": {"metallicFactor": 0.0}}],
         "buffers": [{"byteLength": len(binary)}],
