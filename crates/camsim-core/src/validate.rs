@@ -177,11 +177,6 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
         || "counts the depth look-ups of \"reproject\"; leave it out with any other quality.solver".into(),
     );
     check.require(
-        quality.ideal_samples.value().is_none_or(|samples| [1, IDEAL_SAMPLES].contains(&samples)),
-        "quality.ideal_samples",
-        || format!("must be \"auto\", 1 or {IDEAL_SAMPLES} samples of each pixel of the ideal frame"),
-    );
-    check.require(
         quality.silhouettes != Silhouettes::Rays || quality.ideal_samples != Auto::Value(IDEAL_SAMPLES),
         "quality.ideal_samples",
         || "excludes silhouette rays (quality.silhouettes = \"rays\"); leave one of them out".into(),

@@ -74,6 +74,7 @@ pub struct Key {
     pub step: TokenStream,
     pub low: TokenStream,
     pub high: TokenStream,
+    pub only: Vec<Expr>,
     pub hint: TokenStream,
     pub example: TokenStream,
     pub names: Vec<String>,
@@ -90,6 +91,7 @@ impl Key {
             step: quote!(1.0),
             low: quote!(::camsim_scenario::keys::End::None),
             high: quote!(::camsim_scenario::keys::End::None),
+            only: Vec::new(),
             hint: none(),
             example: none(),
             names: Vec::new(),
@@ -109,6 +111,16 @@ impl Key {
                 "above" => key.low = end(quote!(Open), value),
                 "max" => key.high = end(quote!(Closed), value),
                 "below" => key.high = end(quote!(Open), value),
+                "only" => {
+                    let Expr::Array(list) = value else { return Err(part.error("`only` is a list")) };
+                    key.only = list.elems.into_iter().collect();
+                    let [Some(first), Some(last)] =
+                        [key.only.first(), key.only.last()].map(|end| end.cloned())
+                    else {
+                        return Err(part.error("`only` is empty"));
+                    };
+                    (key.low, key.high) = (end(quote!(Closed), first), end(quote!(Closed), last));
+                }
                 "hint" => key.hint = value.into_token_stream(),
                 "example" => key.example = value.into_token_stream(),
                 "names" => {

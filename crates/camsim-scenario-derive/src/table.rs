@@ -63,7 +63,7 @@ fn default_of(key: &Key) -> TokenStream {
 fn facts_of(field: &Field, rename: Option<String>, key: &Key) -> TokenStream {
     let name = rename.or_else(|| field.ident.as_ref().map(ToString::to_string));
     let (of, description, default) = (&field.ty, doc(&field.attrs), default_of(key));
-    let Key { required, unit, step, low, high, hint, example, names, .. } = key;
+    let Key { required, unit, step, low, high, only, hint, example, names, .. } = key;
     quote! {
         ::camsim_scenario::keys::Field {
             name: #name,
@@ -81,6 +81,7 @@ fn facts_of(field: &Field, rename: Option<String>, key: &Key) -> TokenStream {
             step: #step,
             low: #low,
             high: #high,
+            only: &[#(#only),*],
             hint: #hint,
             example: #example,
             names: &[#(#names),*],

@@ -10,8 +10,8 @@ use super::{
     keys::{Table, Words},
 };
 
-/// Largest offset of a camera's clock, 127 years: stamps of this century stay within 64 bits.
-const MAX_CLOCK_OFFSET_MS: f64 = 4e12;
+/// Largest offset of a camera's or sensor's clock, 127 years: stamps of this century stay within 64 bits.
+pub(crate) const MAX_CLOCK_OFFSET_MS: f64 = 4e12;
 
 /// The camera: geometry, lens, shutter and photometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]

@@ -55,6 +55,8 @@ pub struct Field {
     pub low: End,
     /// Upper end of the legal interval of each number.
     pub high: End,
+    /// The legal numbers within, in ascending order; empty where all are.
+    pub only: &'static [u32],
     /// Advice where a number is outside.
     pub hint: &'static str,
     /// A value as TOML, where the key is absent by default.
@@ -216,6 +218,8 @@ mod tests {
         noise: f64,
         #[key(required, min = 1, max = 9)]
         count: u16,
+        #[key(default = 8, only = [8, 10, 12])]
+        bits: u32,
     }
 
     /// Speeds.
@@ -246,35 +250,39 @@ mod tests {
         let expected = [
             ("gyro.noise", "rad/s/sqrt(Hz)"),
             ("gyro.count", ""),
+            ("gyro.bits", ""),
             ("speed", ""),
             ("points", ""),
             ("all", ""),
             ("all.noise", "/sqrt(Hz)"),
             ("all.count", ""),
+            ("all.bits", ""),
         ];
         assert_eq!(names, expected);
         assert_eq!(keys[1].field.kind, ValueKind::Within(1, 9));
+        assert_eq!((keys[2].field.kind, keys[2].field.only), (ValueKind::Within(8, 12), &[8, 10, 12][..]));
         let defaults: Vec<String> = keys.iter().map(|key| (key.field.default)()).collect();
-        assert_eq!(defaults, ["0.0", "0", "\"slow\"", "[]", "", "0.0", "0"]);
-        assert!(keys[1].field.is_required && !keys[1].field.is_optional && keys[4].field.is_optional);
-        assert_eq!(keys[2].field.kind, ValueKind::Word(&["slow", "fast"]));
-        assert_eq!(keys[2].field.words[0], Word { name: "slow", about: "Slow. As a snail." });
-        assert_eq!((keys[3].field.kind, keys[3].field.names), (ValueKind::Points(2), &["x", "y"][..]));
+        assert_eq!(defaults, ["0.0", "0", "8", "\"slow\"", "[]", "", "0.0", "0", "8"]);
+        assert!(keys[1].field.is_required && !keys[1].field.is_optional && keys[5].field.is_optional);
+        assert_eq!(keys[3].field.kind, ValueKind::Word(&["slow", "fast"]));
+        assert_eq!(keys[3].field.words[0], Word { name: "slow", about: "Slow. As a snail." });
+        assert_eq!((keys[4].field.kind, keys[4].field.names), (ValueKind::Points(2), &["x", "y"][..]));
         assert_eq!((keys[0].field.summary(), Speed::ALL.len(), Speed::Fast.name()), ("Noise.", 2, "fast"));
         assert_eq!(Root::ABOUT, "");
     }
 
     #[test]
     fn numbers_outside_are_found_at_their_keys() {
-        let triad = |noise: f64| Triad { noise, count: 1 };
+        let triad = |noise: f64| Triad { noise, count: 1, bits: 8 };
         let root = Root {
-            gyro: triad(f64::NAN),
+            gyro: Triad { bits: 9, ..triad(f64::NAN) },
             points: vec![[1.0, 2.0]],
             all: Some(vec![triad(1.0), triad(-1.0)]),
             ..Root::default()
         };
         let found = violations(&root);
         let keys: Vec<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
-        assert_eq!(keys, ["gyro.noise", "points", "all.1.noise"]);
+        assert_eq!(keys, ["gyro.noise", "gyro.bits", "points", "all.1.noise"]);
+        assert_eq!(found[1].1, "must be 8, 10 or 12, not 9");
     }
 }

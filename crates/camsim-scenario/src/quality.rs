@@ -57,7 +57,7 @@ pub struct QualitySpec {
     #[key(step = 0.01, min = 1.0, max = 5.0, hint = "or write \"auto\"")]
     pub ideal_scale: Auto<f64>,
     /// Samples per pixel of the ideal frame, 1 or 4. With 4, borders are located within a pixel and smoother.
-    #[key(min = 1, max = IDEAL_SAMPLES, hint = "write 1, 4 or \"auto\"")]
+    #[key(only = [1, IDEAL_SAMPLES], hint = "or write \"auto\"")]
     pub ideal_samples: Auto<u32>,
     /// Ideal frames per output frame.
     #[key(step = 0.05, min = 1, max = MAX_KEY_FRAMES, hint = "or write \"auto\"")]

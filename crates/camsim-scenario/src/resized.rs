@@ -10,16 +10,23 @@ use super::{MAX_SIDE_PX, keys::Table};
 #[serde(default, deny_unknown_fields)]
 pub struct ResizedSpec {
     /// Part of the calibrated picture: left, top, width, height, in its pixels. Left out: all of it.
-    #[key(unit = "px", example = "[64, 48, 512, 384]", names = "left top width height")]
+    #[key(
+        unit = "px",
+        min = 0,
+        max = MAX_SIDE_PX,
+        hint = "give [left, top, width, height]",
+        example = "[64, 48, 512, 384]",
+        names = "left top width height"
+    )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop_px: Option<[u32; 4]>,
     /// Pixels across and down that make one: a number, or one of each. Those that are left over on the right
     /// and below are not used. Left out: one pixel stays one.
-    #[key(step = 0.05, example = "2")]
+    #[key(step = 0.05, min = 1, max = MAX_SIDE_PX, hint = "2 makes one of 2 x 2", example = "2")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub binning: Option<Binning>,
     /// Factor on width and height, which are rounded, in place of `binning`. Left out: no change.
-    #[key(step = 0.005, example = "0.5")]
+    #[key(step = 0.005, above = 0.0, max = MAX_SIDE_PX, hint = "0.5 halves both", example = "0.5")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
     /// Width and height of the delivered picture, in place of `binning` and `scale`. Left out: by these.
@@ -74,7 +81,14 @@ pub struct FilesOfSpec {
     #[key(required, unit = "px", step = 0.05, example = "[319.5, 239.5]", names = "cx cy")]
     pub principal_point_px: [f64; 2],
     /// The camera's picture in that of the files: left, top, width, height, in its pixels.
-    #[key(required, unit = "px", example = "[64.0, 48.0, 512.0, 384.0]", names = "left top width height")]
+    #[key(
+        required,
+        unit = "px",
+        min = 0.0,
+        hint = "give [left, top, width, height]",
+        example = "[64.0, 48.0, 512.0, 384.0]",
+        names = "left top width height"
+    )]
     pub part_px: [f64; 4],
 }
 

@@ -75,7 +75,7 @@ pub struct VideoSpec {
     /// Encoder of `mp4` and `mkv`.
     pub codec: VideoCodec,
     /// Bits of each code value, 8 or 10.
-    #[key(default = 8, step = 0.1, min = 8, max = 10, hint = "give 8 or 10")]
+    #[key(default = 8, step = 0.1, only = [8, 10])]
     pub bits: u32,
     /// Constant rate factor of H.264 and H.265: 0 is best, 51 smallest.
     #[key(default = 18, step = 0.1, min = 0, max = VideoSpec::WORST_CRF, hint = "18 is the default")]

@@ -394,10 +394,12 @@ fn what_cannot_follow_is_refused_with_the_fix() {
         (crop([64, 32, 600, 400]), "camera.resized.crop_px: is [left, top, width, height]"),
         (crop([0, 0, 0, 10]), "which is not a part of the 640 x 480 pixels"),
         (binning(1.5), "another factor is camera.resized.scale"),
-        (binning(0.0), "whole numbers from 1 to 640 across"),
+        (binning(0.0), "camera.resized.binning: must be 1 to 32768, not 0; 2 makes one of 2 x 2"),
+        (binning(641.0), "whole numbers from 1 to 640 across"),
         (scale(-1.0), "0.5 halves both"),
         (scale(f64::NAN), "0.5 halves both"),
         (scale(1e9), "0.5 halves both"),
+        (scale(1e-3), "must leave 1..32768 on each side, not 0.001"),
         (size([0, 240]), "camera.resized.size_px: must be 1 to 32768, not [0, 240]; give [width, height]"),
         (ResizedSpec { scale: Some(0.5), ..binning(2.0) }, "has more than one of binning, scale and size_px"),
     ] {

@@ -3,20 +3,20 @@
 use super::{Check, Problem, validate_camera, validate_cameras, validate_rig};
 use crate::{
     resized::delivered,
-    scenario::{CameraSpec, MAX_SIDE_PX, Rig},
+    scenario::{CameraSpec, MAX_SIDE_PX, Rig, keys::violations},
 };
 
 /// Checks what states another picture than the camera's own.
 pub(super) fn check_resized(check: &mut Check, camera: &CameraSpec) {
-    let is_size = |size_px: &[u32; 2]| size_px.iter().all(|side| (1..=MAX_SIDE_PX).contains(side));
-    // Other sizes are named already.
+    // Numbers outside of their intervals are named already.
     if let Some(resized) = &camera.resized
-        && [Some(camera.size_px), resized.size_px].iter().flatten().all(is_size)
+        && camera.size_px.iter().all(|side| (1..=MAX_SIDE_PX).contains(side))
+        && violations(resized).is_empty()
     {
         check.problems.extend(delivered(camera).err().unwrap_or_default());
     }
     let Some([_, _, width, height]) = camera.files_of.map(|files| files.part_px) else { return };
-    let is_empty = width <= 0.0 || height <= 0.0;
+    let is_empty = width == 0.0 || height == 0.0;
     check.require(!is_empty, "camera.files_of.part_px", || {
         format!(
             "must be [left, top, width, height] of the camera's picture in that of the files, with width and \

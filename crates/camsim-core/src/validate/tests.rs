@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::scenario::{
-    BoardSpec, FieldOr, FlightSpec, GltfSpec, LensSpec, LightSpec, MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS,
-    MAX_ITERATIONS, ObjectsOf, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
+    BoardSpec, FieldOr, FilesOfSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, MAX_BLUR_SAMPLES,
+    MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, ObjectsOf, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
 };
 
 pub(crate) fn good() -> Scenario {
@@ -38,6 +38,10 @@ fn model() -> GltfSpec {
         classes: Default::default(),
         motion: None,
     }
+}
+
+fn part_of_files(part_px: [f64; 4]) -> FilesOfSpec {
+    FilesOfSpec { size_px: [640, 480], focal_px: [500.0, 500.0], principal_point_px: [319.5, 239.5], part_px }
 }
 
 #[test]
@@ -201,6 +205,9 @@ fn each_value_out_of_range_is_named_once() {
         }),
         ("output.channels", |s| s.output.channels.clear()),
         ("output.flow_step", |s| s.output.flow_step = 0),
+        ("output.video.bits", |s| s.output.video.bits = 9),
+        ("camera.files_of.part_px", |s| s.camera.files_of = Some(part_of_files([-1.0, 0.0, 640.0, 480.0]))),
+        ("camera.files_of.part_px", |s| s.camera.files_of = Some(part_of_files([0.0, 0.0, 640.0, 0.0]))),
     ];
     for (key, edit) in cases {
         let mut scenario = good();

@@ -54,7 +54,10 @@ impl End {
 
 impl Field {
     fn admits(&self, number: f64) -> bool {
-        number.is_finite() && self.low.admits(|low| number - low) && self.high.admits(|high| high - number)
+        number.is_finite()
+            && self.low.admits(|low| number - low)
+            && self.high.admits(|high| high - number)
+            && (self.only.is_empty() || self.only.iter().any(|&legal| f64::from(legal) == number))
     }
 
     /// The key with what is wrong with its value.
@@ -70,6 +73,10 @@ impl Field {
     /// What each number must be: `a finite number above 0`.
     #[must_use]
     pub fn interval(&self) -> String {
+        if let [others @ .., last] = self.only {
+            let others: Vec<String> = others.iter().map(u32::to_string).collect();
+            return format!("{} or {last}", others.join(", "));
+        }
         let short = |end: End| end.value().map_or(Short(0.0), Short);
         let (low, high) = (short(self.low), short(self.high));
         match (self.low, self.high) {

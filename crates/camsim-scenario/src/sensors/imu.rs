@@ -3,7 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::{MAX_RATE_HZ, PerAxis, SensorAxes, SensorMountSpec};
-use crate::keys::{Table, Words};
+use crate::{
+    camera::MAX_CLOCK_OFFSET_MS,
+    keys::{Table, Words},
+};
 
 /// What a sensor is fixed to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
@@ -45,7 +48,13 @@ pub struct ImuSpec {
     #[key(unit = "(rad/s)/(m/s2)", step = 1e-6)]
     pub g_sensitivity: PerAxis,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(unit = "ms", step = 0.1)]
+    #[key(
+        unit = "ms",
+        step = 0.1,
+        min = -MAX_CLOCK_OFFSET_MS,
+        max = MAX_CLOCK_OFFSET_MS,
+        hint = "it is how much the sensor's clock is ahead"
+    )]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]

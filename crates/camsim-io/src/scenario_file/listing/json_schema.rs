@@ -104,6 +104,9 @@ fn of_kind(field: &Field) -> Value {
 
 /// A number within its legal interval.
 fn limited(kind: &str, field: &Field) -> Value {
+    if !field.only.is_empty() {
+        return json!({ "type": kind, "enum": field.only });
+    }
     // TOML tells 4 from 4.0, and servers such as tombi take "number" alone as the latter.
     let mut schema = match kind {
         "number" => json!({ "type": ["number", "integer"] }),

@@ -87,6 +87,7 @@ fn value(field: &Field, table_unit: &str) -> String {
         ValueKind::Number => format!("number{interval}"),
         ValueKind::NumberOr(words) => format!("number{interval}, or {}", quoted(words)),
         ValueKind::Whole => "whole number".to_owned(),
+        ValueKind::Within(..) if !field.only.is_empty() => format!("whole number{interval}"),
         ValueKind::Within(low, high) if high == u32::MAX => format!("whole number from {low}"),
         ValueKind::Within(low, high) => format!("whole number, {low} to {high}"),
         ValueKind::CountOr(_, words) => format!("whole number{interval}, or {}", quoted(words)),

@@ -32,6 +32,10 @@ fn sensors_are_read_and_their_problems_named_by_line() {
             "s.toml:8: imu.0.gyro.noise_density: expected a number or a list of 3",
         ),
         ("gyro.noise_density = -1", "s.toml:8: imu.0.gyro.noise_density: must be a finite number, 0 or more"),
+        (
+            "clock_offset_ms = -5e12",
+            "imu.0.clock_offset_ms: must be -4e12 to 4e12, not -5000000000000; it is",
+        ),
         ("axes = \"fru\"", "imu.0.axes: expected one of \"frd\", \"flu\", \"rdf\""),
         ("[[imu]]", "s.toml:8: imu.1.name: is missing"),
         ("[[gnss]]\nname = \"A\"", "s.toml:9: gnss.0.name: \"A\" names two sensors"),
