@@ -181,7 +181,7 @@ impl<'a> Comparison<'a> {
 }
 
 /// Frames per second: median and quartiles.
-fn frame_rate(variant: &Variant<'_>) -> String {
+pub fn frame_rate(variant: &Variant<'_>) -> String {
     let [fast_ms, median_ms, slow_ms] = quartiles(&variant.ms);
     format!("{:.1} ({:.1} .. {:.1})", 1e3 / median_ms, 1e3 / slow_ms, 1e3 / fast_ms)
 }

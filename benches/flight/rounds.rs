@@ -44,6 +44,10 @@ impl RoundLimits {
 /// A camera on one renderer, with its measured times.
 pub struct Variant<'a> {
     pub session: Session<'a>,
+    /// The channels of the session.
+    pub channels: Vec<Channel>,
+    /// Cameras of a rig, which the session renders in turn; none if it has one camera.
+    pub rig: Vec<Arc<Sequence>>,
     /// Whether one frame is rendered over and over, so that its ideal frame is drawn once.
     pub is_still: bool,
     /// Time to open the session and render two frames: upload, pipelines, lens map.
@@ -62,11 +66,30 @@ impl<'a> Variant<'a> {
         render(&mut session, 0..2)?;
         Ok(Self {
             session,
+            channels: channels.into(),
+            rig: Vec::new(),
             is_still: false,
             start: begin.elapsed(),
             ms: Vec::new(),
             processor_ms: Vec::new(),
         })
+    }
+
+    /// Does the same with each camera of the rig, or with the only one. Pipelines, textures and what is known of
+    /// the scene stay from camera to camera, as in `camsim render`; a frame is rendered for the lens map.
+    pub fn each_camera<T>(
+        &mut self,
+        mut work: impl FnMut(&mut Session<'a>) -> Outcome<T>,
+    ) -> Outcome<Vec<T>> {
+        if self.rig.is_empty() {
+            return Ok(vec![work(&mut self.session)?]);
+        }
+        let turn_to = |camera: &Arc<Sequence>| {
+            self.session.renew::<Infallible>(camera.clone(), &self.channels)?;
+            render(&mut self.session, [0])?;
+            work(&mut self.session)
+        };
+        self.rig.iter().map(turn_to).collect()
     }
 }
 
@@ -83,21 +106,23 @@ pub fn measure(variants: &mut [Variant<'_>], frames: u64, limits: RoundLimits) -
         let count = variants.len();
         for place in 0..count {
             let variant = &mut variants[(place + round) % count];
-            if variant.is_still {
-                render(&mut variant.session, [first])?;
-            } else {
-                variant.session.forget();
-            }
-            let processor_begin_ms = processor_ms();
-            let begin = Instant::now();
-            render(
-                &mut variant.session,
-                (first..first + burst).map(|frame| if variant.is_still { first } else { frame }),
-            )?;
-            variant.ms.push(ms(begin.elapsed()) / burst as f64);
-            variant.processor_ms.extend(
-                processor_begin_ms.zip(processor_ms()).map(|(begin, end)| (end - begin) / burst as f64),
-            );
+            let is_still = variant.is_still;
+            let times = variant.each_camera(|session| {
+                if is_still {
+                    render(session, [first])?;
+                } else {
+                    session.forget();
+                }
+                let processor_begin_ms = processor_ms();
+                let begin = Instant::now();
+                render(session, (first..first + burst).map(|frame| if is_still { first } else { frame }))?;
+                let passed_ms = ms(begin.elapsed());
+                Ok((passed_ms, processor_begin_ms.zip(processor_ms()).map(|(begin, end)| end - begin)))
+            })?;
+            let frames = (burst * times.len() as u64) as f64;
+            variant.ms.push(times.iter().map(|(ms, _)| ms).sum::<f64>() / frames);
+            let processor_ms: Option<f64> = times.iter().map(|(_, ms)| *ms).sum();
+            variant.processor_ms.extend(processor_ms.map(|ms| ms / frames));
         }
     }
     Ok(())

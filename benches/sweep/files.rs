@@ -14,7 +14,8 @@ use crate::{
 };
 
 const ROUNDS: usize = 3;
-const FRAMES: &str = "32..64";
+/// Those that are measured, or rendered once.
+const FRAMES: [&str; 2] = ["32..64", "32"];
 /// File formats and their options.
 const FORMATS: [(&str, &[&str]); 5] = [
     ("none", &["--format", "none"]),
@@ -25,26 +26,26 @@ const FORMATS: [(&str, &[&str]); 5] = [
 ];
 
 /// One command line of `camsim render`, with what it printed.
-struct Program {
+pub struct Program {
+    scenario: &'static str,
     backend: &'static str,
     options: Vec<&'static str>,
-    frames_per_s: Vec<f64>,
+    pub frames_per_s: Vec<f64>,
     peak_mb: Vec<f64>,
 }
 
 impl Program {
-    fn new(backend: &'static str, format: &[&'static str], more: &[&'static str]) -> Self {
-        let options = [format, more].concat();
-        Self { backend, options, frames_per_s: Vec::new(), peak_mb: Vec::new() }
+    pub fn new(scenario: &'static str, backend: &'static str, options: &[&[&'static str]]) -> Self {
+        Self { scenario, backend, options: options.concat(), frames_per_s: Vec::new(), peak_mb: Vec::new() }
     }
 
     /// Renders to a new folder.
-    fn run(&mut self, folder: &Path, is_measuring: bool) -> Outcome<()> {
+    pub fn run(&mut self, folder: &Path) -> Outcome<()> {
         let run = Command::new(env!("CARGO_BIN_EXE_camsim"))
-            .args(["render".as_ref(), in_repository(ALL_EFFECTS).as_os_str()])
+            .args(["render".as_ref(), in_repository(self.scenario).as_os_str()])
             .args(["--backend", self.backend])
             .args(&self.options)
-            .args(["--frames", if is_measuring { FRAMES } else { "32" }, "--times", "-o"])
+            .args(["--times", "-o"])
             .arg(folder)
             .output()?;
         let text = String::from_utf8_lossy(&run.stdout).into_owned();
@@ -66,21 +67,26 @@ pub fn files(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
     let has_gpu = renderers.gpu.is_some();
     let formats = &FORMATS[..if is_measuring { FORMATS.len() } else { 2 }];
     let backends: &[&str] = if has_gpu { &["cpu", "gpu"] } else { &["cpu"] };
+    let frames = ["--frames", FRAMES[usize::from(!is_measuring)]];
     let mut programs: Vec<Program> = formats
         .iter()
-        .flat_map(|(_, options)| backends.iter().map(|backend| Program::new(backend, options, &[])))
+        .flat_map(|(_, options)| {
+            backends.iter().map(|backend| Program::new(ALL_EFFECTS, backend, &[options, &frames]))
+        })
         .collect();
     let (preset_backend, _) = renderers.preset();
-    programs.push(Program::new(preset_backend, FORMATS[0].1, &["--set", "quality.preset=paper"]));
+    let paper: &[&str] = &["--set", "quality.preset=paper"];
+    programs.push(Program::new(ALL_EFFECTS, preset_backend, &[FORMATS[0].1, &frames, paper]));
     for round in 0..if is_measuring { ROUNDS } else { 1 } {
         let count = programs.len();
         for place in 0..count {
-            programs[(place + round) % count].run(&folder.path().join("frames"), is_measuring)?;
+            programs[(place + round) % count].run(&folder.path().join("frames"))?;
         }
     }
     println!(
-        "\nrounds    {} of frames {FRAMES}, all programs in turn; medians, quartiles in brackets\n",
-        programs[0].frames_per_s.len()
+        "\nrounds    {} of frames {}, all programs in turn; medians, quartiles in brackets\n",
+        programs[0].frames_per_s.len(),
+        frames[1]
     );
     let titles = [
         "files",

@@ -1,9 +1,9 @@
-//! Frame rates of `benches/all_effects.toml` by frame size, blur, effect and file format; the cost of the
+//! Scenes of users, stage by stage; frame rates of `benches/all_effects.toml` by frame size, blur, effect and file format; the cost of the
 //! houses of `benches/houses.toml`; and the planner's cost model beside measured times. Each table has the
 //! cpu renderer, the gpu renderer and the paper's preset side by side, measured in the same rounds.
 //!
 //! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two
-//! (`renderers`, `size`, `blur`, `effects`, `alike`, `features`, `passes`, `houses`, `costs`, `files`).
+//! (`scenes`, `renderers`, `size`, `blur`, `effects`, `alike`, `features`, `passes`, `houses`, `costs`, `files`).
 //! `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
@@ -16,13 +16,15 @@ mod flight;
 mod houses;
 mod passes;
 mod scenario;
+mod scenes;
 
 use flight::{Outcome, comparison::Renderers};
 
 /// Prints a table; a single row with one frame unless the program measures.
 type Table = fn(&Renderers, bool) -> Outcome<()>;
 
-const TABLES: [(&str, Table); 10] = [
+const TABLES: [(&str, Table); 11] = [
+    ("scenes", scenes::scenes),
     ("renderers", cameras::renderers),
     ("size", cameras::size),
     ("blur", cameras::blur),
@@ -47,7 +49,7 @@ fn main() -> Outcome<()> {
     let renderers = Renderers::open()?;
     println!("{}", renderers.text());
     println!(
-        "frames of {}, 640x480 unless a table says otherwise; read back, nothing encoded but for `files`",
+        "frames of {}, 640x480 unless a table says otherwise; read back, nothing encoded but for files",
         scenario::ALL_EFFECTS
     );
     for (name, table) in TABLES {

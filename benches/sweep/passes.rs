@@ -1,13 +1,13 @@
 //! Time of each pass, measured and as the planner's cost model predicts it.
 
-use std::{convert::Infallible, sync::Arc};
+use std::{convert::Infallible, ops::Range, sync::Arc};
 
 use camsim::{
     core::{
         scenario::{Auto, Channel, Silhouettes},
         sequence::Sequence,
     },
-    engine::Engine,
+    engine::{Engine, Session},
     lab::{
         cases::cases,
         timing::{quantile, quartiles},
@@ -25,7 +25,7 @@ use crate::{
 const NO_TIME_STAMPS: &str = "no time stamps";
 
 /// Milliseconds by stage, one entry per frame in which it ran.
-type StageTimes = Vec<(String, Vec<f64>)>;
+pub type StageTimes = Vec<(String, Vec<f64>)>;
 
 /// Where the time of a frame goes.
 pub fn passes(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
@@ -41,14 +41,14 @@ pub fn passes(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
     for (name, sequence) in &cameras {
         for (renderer, engine) in [("cpu", cpu), ("gpu", gpu)] {
             let times = match engine {
-                Some(engine) => stage_times(engine, sequence, frames.clone())?,
+                Some(engine) => stage_times_of(engine, sequence, frames.clone())?,
                 None => Err(NO_ADAPTER),
             };
             columns.push((format!("{name}, {renderer}"), times));
         }
     }
     let (renderer, engine) = renderers.preset();
-    columns.push((format!("{PRESET}, {renderer}"), stage_times(engine, &paper_preset()?, frames)?));
+    columns.push((format!("{PRESET}, {renderer}"), stage_times_of(engine, &paper_preset()?, frames)?));
     let mut stages: Vec<&str> = Vec::new();
     for (stage, _) in columns.iter().flat_map(|(_, times)| times.iter().flatten()) {
         if !stages.contains(&stage.as_str()) {
@@ -71,13 +71,22 @@ pub fn passes(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
     Ok(())
 }
 
-/// Renders frames and collects the times of their stages.
-fn stage_times(
+/// [`stage_times`] of a new session.
+fn stage_times_of(
     engine: &Engine,
     sequence: &Arc<Sequence>,
-    frames: std::ops::Range<u64>,
+    frames: Range<u64>,
 ) -> Outcome<Result<StageTimes, &'static str>> {
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color])?;
+    stage_times(engine, &mut session, frames)
+}
+
+/// Renders frames and collects the times of their stages.
+pub fn stage_times(
+    engine: &Engine,
+    session: &mut Session<'_>,
+    frames: Range<u64>,
+) -> Outcome<Result<StageTimes, &'static str>> {
     if engine.gpu().is_some() && !session.time_passes() {
         return Ok(Err(NO_TIME_STAMPS));
     }

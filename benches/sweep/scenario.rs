@@ -4,7 +4,10 @@ use std::{path::PathBuf, sync::Arc};
 
 use camsim::{
     core::sequence::Sequence,
-    io::{load::load_sequence, scenario_file::read_scenario},
+    io::{
+        load::{load_rig, load_sequence},
+        scenario_file::{read_rig, read_scenario},
+    },
 };
 
 use crate::flight::Outcome;
@@ -13,7 +16,7 @@ use crate::flight::Outcome;
 pub const ALL_EFFECTS: &str = "benches/all_effects.toml";
 /// The terrain with 5000 houses.
 pub const HOUSES: &str = "benches/houses.toml";
-/// Frames of either scenario that are measured.
+/// Frames of a scenario that are measured.
 pub const FRAMES: u64 = 96;
 
 /// Path of a file in the repository.
@@ -31,6 +34,12 @@ pub fn sequence_with(path: &str, sets: &[(&str, String)]) -> Outcome<Arc<Sequenc
     let sets: Vec<(String, String)> =
         sets.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     Ok(load_sequence(&read_scenario(&in_repository(path), &sets, None)?)?.sequence)
+}
+
+/// The cameras of a scenario of the repository.
+pub fn rig(path: &str) -> Outcome<Vec<Arc<Sequence>>> {
+    let loaded = load_rig(&read_rig(&in_repository(path), &[], None)?)?;
+    Ok(loaded.into_iter().map(|loaded| loaded.sequence).collect())
 }
 
 /// [`ALL_EFFECTS`] with the paper's preset.
