@@ -1,9 +1,10 @@
-//! Scenes of users, stage by stage; frame rates of `benches/all_effects.toml` by frame size, blur, effect and file format; the cost of the
-//! houses of `benches/houses.toml`; and the planner's cost model beside measured times. Each table has the
-//! cpu renderer, the gpu renderer and the paper's preset side by side, measured in the same rounds.
+//! Scenes of users, stage by stage; frame rates of `benches/all_effects.toml` by frame size, blur, effect and
+//! file format; the cost of the houses of `benches/houses.toml`; and the planner's cost model beside measured
+//! times. Each table has the cpu renderer, the gpu renderer and the paper's preset side by side, measured in
+//! the same rounds.
 //!
-//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two
-//! (`scenes`, `renderers`, `size`, `blur`, `effects`, `alike`, `features`, `passes`, `houses`, `costs`, `files`).
+//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`scenes`,
+//! `renderers`, `size`, `blur`, `effects`, `alike`, `features`, `passes`, `houses`, `costs`, `files`).
 //! `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]

@@ -7,7 +7,7 @@ use std::{
 };
 
 use camsim::{
-    core::{scenario::Channel, sequence::Sequence},
+    core::{scenario::Channel, sequence::Sequence, validate::validate},
     engine::Engine,
     lab::timing::{ms, processor_ms, quartiles},
 };
@@ -102,10 +102,12 @@ fn scene(
     if let Some(gpu) = &renderers.gpu {
         variants.extend([open(gpu, &cameras, &[Channel::Color])?, open(gpu, &cameras, truth)?]);
     }
-    let preset_at = (!is_divided).then_some(variants.len());
-    if !is_divided {
-        let cameras: Vec<_> = cameras.iter().map(|camera| with_paper_preset(camera)).collect();
-        variants.push(open(renderers.preset().1, &cameras, &[Channel::Color])?);
+    // The paper's methods do not have all parts of a camera.
+    let paper: Vec<_> = cameras.iter().map(|camera| with_paper_preset(camera)).collect();
+    let has_preset = paper.iter().all(|camera| validate(&camera.scenario).is_empty());
+    let preset_at = has_preset.then_some(variants.len());
+    if has_preset {
+        variants.push(open(renderers.preset().1, &paper, &[Channel::Color])?);
     }
     let frames = cameras.iter().map(|camera| camera.frames).min().unwrap_or(0).min(FRAMES);
     measure(&mut variants, frames, limits)?;
