@@ -114,8 +114,7 @@ impl Key {
                 "only" => {
                     let Expr::Array(list) = value else { return Err(part.error("`only` is a list")) };
                     key.only = list.elems.into_iter().collect();
-                    let [Some(first), Some(last)] =
-                        [key.only.first(), key.only.last()].map(|end| end.cloned())
+                    let (Some(first), Some(last)) = (key.only.first().cloned(), key.only.last().cloned())
                     else {
                         return Err(part.error("`only` is empty"));
                     };
