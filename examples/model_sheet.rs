@@ -55,9 +55,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         match read_gltf(file, GltfOptions { time_s: Some(seconds), ..GltfOptions::default() }) {
             Err(error) => refused.push(error.to_string()),
             Ok(model) => {
-                let place = [frames.len() as u32 / COLUMNS + 1, frames.len() as u32 % COLUMNS + 1];
+                let cell = [frames.len() as u32 / COLUMNS + 1, frames.len() as u32 % COLUMNS + 1];
                 let name = file.strip_prefix(&folder).unwrap_or(file).display();
-                println!("row {} column {}: {name}, {} triangles", place[0], place[1], model.triangles());
+                println!("row {} column {}: {name}, {} triangles", cell[0], cell[1], model.triangles());
                 model.notes.iter().for_each(|note| println!("    {note}"));
                 frames.push(portrait(&engine, &model)?);
             }

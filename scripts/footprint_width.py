@@ -35,10 +35,10 @@ def by_grid(at, width, most, count):
     side = 0 if taps == 1 else np.sqrt((width**2 - 3) / (1 - 1 / taps**2))
     weights = np.zeros(count)
     for tap in range(taps):
-        place = at + ((tap + 0.5) / taps - 0.5) * side
-        first = int(np.floor(place))
-        weights[first] += (1 - place + first) / taps
-        weights[first + 1] += (place - first) / taps
+        position = at + ((tap + 0.5) / taps - 0.5) * side
+        first = int(np.floor(position))
+        weights[first] += (1 - position + first) / taps
+        weights[first + 1] += (position - first) / taps
     return weights
 
 

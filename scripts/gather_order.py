@@ -65,11 +65,11 @@ def left(order, columns, rows, widths, path_px, rounds):
     for direction in range(DIRECTIONS):
         turn = 2.0 * np.pi * (direction + 0.5) / DIRECTIONS + 0.1
         path = path_px * np.array([np.cos(turn), np.sin(turn)])
-        places = cell_px + share[:, None] * path
+        positions = cell_px + share[:, None] * path
         exact = np.sinc(widths[0] * F[:, 0]) * np.sinc(widths[1] * F[:, 1]) * np.sinc(F @ path)
         for alias in ALIASES:
             f = F + np.array(alias)
-            read = (np.sinc(f[:, 0]) * np.sinc(f[:, 1])) ** 2 * np.exp(2j * np.pi * (f @ places.T)).mean(1)
+            read = (np.sinc(f[:, 0]) * np.sinc(f[:, 1])) ** 2 * np.exp(2j * np.pi * (f @ positions.T)).mean(1)
             total += np.sum(WEIGHT * np.abs(read - (exact if alias == (0, 0) else 0.0)) ** 2)
     return total / DIRECTIONS
 
@@ -94,7 +94,7 @@ def in_pairs(count):
 
 def report(order, columns, rows):
     times = np.exp(score(order, columns, rows) - score(in_pairs(len(order)), columns, rows))
-    packed = sum(place << 4 * turn for turn, place in enumerate(order))
+    packed = sum(cell << 4 * turn for turn, cell in enumerate(order))
     print(f"{columns} x {rows}: {times:.3f} of pairs, off the centre by {off_centre(order, columns, rows):.2f} cells at most, 0x{packed:x}")
 
 
@@ -103,7 +103,7 @@ def search(columns, rows, seconds):
     cost = lambda order: score(order, columns, rows) + OFF_CENTRE * off_centre(order, columns, rows)
     best = (cost(in_pairs(count)), in_pairs(count))
     while time.time() - begin < seconds:
-        order = [int(place) for place in random.permutation(count)]
+        order = [int(cell) for cell in random.permutation(count)]
         now, moved = cost(order), True
         while moved and time.time() - begin < seconds:
             moved = False

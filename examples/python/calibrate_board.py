@@ -29,14 +29,14 @@ scenario = camsim.Scenario.from_dict(
     }
 )
 
-places = np.c_[camsim.board(scenario).points_m, np.zeros(columns * rows)].astype(np.float32)
+points_m = np.c_[camsim.board(scenario).points_m, np.zeros(columns * rows)].astype(np.float32)
 found, seen = [], []
 for frame in scenario.frames(channels=["color"], progress=True):
     picture = (255 * np.clip(frame.color[..., 1], 0, 1) ** (1 / 2.2)).astype(np.uint8)
     ok, corners = cv2.findChessboardCornersSB(picture, (columns, rows))
     if ok:
         found.append(corners)
-        seen.append(places)
+        seen.append(points_m)
 
 error_px, matrix, coefficients, _, _ = cv2.calibrateCamera(seen, found, scenario.lens.size_px, None, None, flags=cv2.CALIB_FIX_K3)
 print(f"{len(found)} of {len(scenario)} pictures show the whole board; reprojection error {error_px:.3f} px")

@@ -7,7 +7,7 @@ _WORDS: dict[str, str] = {}
 
 
 def name_path(path: str, words: str) -> None:
-    """From now on messages have these words in place of a path."""
+    """From now on messages have these words instead of a path."""
     _WORDS[path] = words
 
 
@@ -18,7 +18,7 @@ def forget_paths(folder: str) -> None:
 
 
 def in_users_words(message: str) -> str:
-    """A message that names what the user gave in place of files that the user has never seen."""
+    """A message that names what the user gave instead of files that the user has never seen."""
     for path in sorted(_WORDS, key=len, reverse=True):
         message = message.replace(path, _WORDS.get(path, path))
     return message

@@ -46,9 +46,9 @@ class Samples:
     def __getitem__(self, index: Any) -> dict[str, Any]:
         """Arrays by channel, with `sample`, `frame`, `stamp_ns` and, of a variation, `variation` and `drawn`."""
         number = frame_number(index, len(self), "sample")
-        variation, place = divmod(number, len(self.frames))
+        variation, index = divmod(number, len(self.frames))
         scenario = self._scenario(variation)
-        frame = scenario.render(self.frames[place], self.channels)
+        frame = scenario.render(self.frames[index], self.channels)
         sample: dict[str, Any] = dict(frame)
         sample.update(sample=number, frame=frame.index, stamp_ns=frame.stamp_ns)
         if isinstance(self.source, Variations):

@@ -1,4 +1,4 @@
-"""Logs, terrains and pictures from arrays, in place of files."""
+"""Logs, terrains and pictures from arrays, instead of files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _PICTURES = frozenset({"image", "ortho", "vignette"})
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseTable:
-    """A flight from arrays, in place of the file of `flight.log`.
+    """A flight from arrays, instead of the file of `flight.log`.
 
     >>> t_s = np.linspace(0, 10, 101)
     >>> log = camsim.PoseTable(t_s, position_ned_m=np.c_[20 * t_s, 0 * t_s, 0 * t_s - 100])
@@ -44,11 +44,11 @@ class PoseTable:
     position_ned_m: ArrayLike | None = None
     """Positions of the platform: north, east, down, metres; shape (N, 3)."""
     geodetic: ArrayLike | None = None
-    """In place of them: latitude, longitude, degrees, and height, m (as `flight.height` says), in this order; shape (N, 3)."""
+    """Instead of them: latitude, longitude, degrees, and height, m (as `flight.height` says), in this order; shape (N, 3)."""
     ned_from_body_wxyz: ArrayLike | None = None
     """Attitudes, scalar first, from body axes (forward, right, down); shape (N, 4)."""
     angles_deg: ArrayLike | None = None
-    """In place of them: roll, pitch, yaw, degrees; shape (N, 3). Without attitudes set
+    """Instead of them: roll, pitch, yaw, degrees; shape (N, 3). Without attitudes set
     `flight.attitude = "track"`: the nose looks along the way."""
 
     def __post_init__(self) -> None:
@@ -96,7 +96,7 @@ class PoseTable:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HeightMap:
-    """Heights from an array, in place of the file of `scene.terrain.dem`.
+    """Heights from an array, instead of the file of `scene.terrain.dem`.
 
     Its rows lead from north to south, its columns from west to east.
 
@@ -119,7 +119,7 @@ class HeightMap:
         if heights.ndim != 2 or min(heights.shape) < 2:
             raise InputError(f"HeightMap: heights of shape (rows, columns), two of each at least, not {heights.shape}")
         if not np.isfinite(heights).any():
-            raise InputError("HeightMap: heights_m has no finite height: NaN is for places without ground")
+            raise InputError("HeightMap: heights_m has no finite height: NaN is for positions without ground")
         for what, pair in (("north_west", self.north_west), ("step", self.step)):
             if np.shape(pair) != (2,) or not np.isfinite(pair).all():
                 raise InputError(f"HeightMap: {what}: two finite numbers are needed, not {pair!r}")
@@ -132,14 +132,14 @@ class HeightMap:
 
     @classmethod
     def around(cls, heights_m: ArrayLike, *, lat_deg: float, lon_deg: float, step_m: float) -> HeightMap:
-        """Heights with their middle at a place. Steps in degrees are constant, so that the length of those to the
+        """Heights with their middle at a position. Steps in degrees are constant, so that the length of those to the
         east changes with latitude, as it does on the Earth."""
         if np.ndim(heights_m) != 2:
             raise InputError(f"HeightMap: heights of shape (rows, columns) are needed, not {np.shape(heights_m)}")
         if not step_m > 0:
             raise InputError(f"HeightMap: step_m: must be above 0, not {step_m!r}")
         if not (abs(lat_deg) < 90 and abs(lon_deg) <= 360):
-            raise InputError(f"HeightMap: no such place: lat_deg = {lat_deg!r}, lon_deg = {lon_deg!r}")
+            raise InputError(f"HeightMap: no such position: lat_deg = {lat_deg!r}, lon_deg = {lon_deg!r}")
         rows, columns = np.shape(heights_m)
         sin = math.sin(math.radians(lat_deg))
         semi_axis_m, eccentricity2 = 6_378_137.0, 6.694_379_990_141_317e-3
@@ -184,12 +184,12 @@ def _tiff(pixels: bytes, tags: list[tuple[int, str, list[Any]]]) -> bytes:
     codes = {"H": 3, "I": 4, "d": 12}
     pixels += b"\0" * (-len(pixels) % 8)
     directory = 8 + len(pixels)
-    place = directory + 2 + 12 * len(tags) + 4
+    offset = directory + 2 + 12 * len(tags) + 4
     entries, values = b"", b""
     for tag, code, numbers in tags:
         packed = struct.pack(f"<{len(numbers)}{code}", *numbers)
         if len(packed) > 4:
-            field = struct.pack("<I", place + len(values))
+            field = struct.pack("<I", offset + len(values))
             values += packed + b"\0" * (-len(packed) % 8)
         else:
             field = packed.ljust(4, b"\0")
@@ -274,7 +274,7 @@ class InputFiles:
         return {} if self._held is None else {path.name: path.read_bytes() for path in sorted(self.folder.iterdir())}
 
     def placed(self, value: Any, key: str = "") -> Any:
-        """A tree with paths of files in place of arrays. `key` is for messages."""
+        """A tree with paths of files instead of arrays. `key` is for messages."""
         if isinstance(value, Mapping):
             return {name: self.placed(item, f"{key}.{name}" if key else str(name)) for name, item in value.items()}
         if isinstance(value, (list, tuple)):
@@ -293,7 +293,7 @@ class InputFiles:
         if leaf == "log":
             raise InputError(f"{key}: an array is not a log: give camsim.PoseTable(t_s, ...)")
         if leaf == "dem":
-            raise InputError(f"{key}: an array has no place on the Earth: give camsim.HeightMap(...) or camsim.HeightMap.around(...)")
+            raise InputError(f"{key}: an array has no position on the Earth: give camsim.HeightMap(...) or camsim.HeightMap.around(...)")
         if array.ndim >= 2 and array.dtype == np.uint8:
             try:
                 return self._write(f"picture-{self._count}.png", _png(array), f"{key} (the array)")
@@ -307,5 +307,5 @@ class InputFiles:
         return array.tolist()
 
     def text(self, value: Any, key: str) -> str:
-        """A value as text of TOML, with paths of files in place of arrays."""
+        """A value as text of TOML, with paths of files instead of arrays."""
         return _toml.value_text(self.placed(value, key), key)

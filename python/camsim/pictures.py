@@ -117,7 +117,7 @@ def apply(
     seed: int = 0,
     frame: int = 0,
 ) -> Applied:
-    """What a camera would have taken in place of a perfect one: `camsim apply` on arrays.
+    """What a camera would have taken instead of a perfect one: `camsim apply` on arrays.
 
     The ideal picture should show 10 to 20 % more than the camera does: lens and motion look beyond its border.
 

@@ -84,7 +84,7 @@ class Scenario(Sequence[Frame]):
     ) -> Scenario:
         """A scenario from a tree of keys, as `to_dict` gives it.
 
-        :param tree: Tables, lists, numbers and text; what is left out has its default. In place of paths there may be
+        :param tree: Tables, lists, numbers and text; what is left out has its default. Instead of paths there may be
             a `PoseTable` (log), a `HeightMap` (DEM), and pictures as arrays of bytes.
         :param folder: The folder that relative paths are in.
 

@@ -80,15 +80,15 @@ pub fn board_of<'py>(py: Python<'py>, loaded: &Loaded) -> PyResult<Option<Bound<
     let board = py.detach(|| read_board(spec)).or_input_error()?;
     let centre_ned_m = board_position_ned_m(scenario, spec, &loaded.log).or_input_error()?;
     let turn = ned_from_board(spec.angles_deg);
-    let place = move |point: DVec3| centre_ned_m + turn * point;
-    parts(py, &board, Some(&place)).map(Some)
+    let position = move |point: DVec3| centre_ned_m + turn * point;
+    parts(py, &board, Some(&position)).map(Some)
 }
 
-/// Picture and points of a board, with their places in the world where it has one.
+/// Picture and points of a board, with their positions in the world where it has one.
 fn parts<'py>(
     py: Python<'py>,
     board: &Board,
-    place: Option<&dyn Fn(DVec3) -> DVec3>,
+    position: Option<&dyn Fn(DVec3) -> DVec3>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let texture = py.detach(|| board.picture());
     let [width, height] = texture.size_px.map(|side| side as usize);
@@ -100,8 +100,9 @@ fn parts<'py>(
     dict.set_item("ids", column(py, points, |point| point.id))?;
     let flat = points.iter().flat_map(|point| point.position_m.to_array()).collect();
     dict.set_item("points_m", table(py, flat, 2)?)?;
-    let ned =
-        place.map(|place| vectors(py, points, |point| place(point.position_m.extend(0.0)))).transpose()?;
+    let ned = position
+        .map(|position| vectors(py, points, |point| position(point.position_m.extend(0.0))))
+        .transpose()?;
     dict.set_item("points_ned_m", ned)?;
     Ok(dict)
 }

@@ -65,13 +65,13 @@ def test_two_workers_give_the_bytes_of_one_process(
     seen = []
     for batch in loader:
         assert batch["color"].shape == (3, 4, 120, 160) and batch["object"].dtype == torch.int32
-        for place, number in enumerate(batch["sample"].tolist()):
+        for index, number in enumerate(batch["sample"].tolist()):
             seen.append(number)
             wanted = rendered[number]
-            assert np.array_equal(batch["color"][place].permute(1, 2, 0).numpy(), wanted["color"])
-            assert np.array_equal(batch["depth"][place].numpy(), wanted["depth"])
-            assert np.array_equal(batch["object"][place].numpy(), wanted["object"])
-            exposure = batch["drawn"]["camera.shutter.exposure_ms"][place].item()
+            assert np.array_equal(batch["color"][index].permute(1, 2, 0).numpy(), wanted["color"])
+            assert np.array_equal(batch["depth"][index].numpy(), wanted["depth"])
+            assert np.array_equal(batch["object"][index].numpy(), wanted["object"])
+            exposure = batch["drawn"]["camera.shutter.exposure_ms"][index].item()
             assert exposure == wanted["drawn"]["camera.shutter.exposure_ms"]
     assert sorted(seen) == list(range(COUNT))
 

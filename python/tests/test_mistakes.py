@@ -32,10 +32,10 @@ def tree(**keys: Any) -> dict[str, Any]:
     }
     for key, value in keys.items():
         table, _, leaf = key.rpartition("__")
-        place = made
+        target = made
         for name in table.split("__"):
-            place = place.setdefault(name, {})
-        place[leaf] = value
+            target = target.setdefault(name, {})
+        target[leaf] = value
     return made
 
 

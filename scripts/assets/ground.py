@@ -36,7 +36,7 @@ class Ground:
         return self.north_deg - (row + 0.5) * self.step_deg, self.west_deg + (col + 0.5) * self.step_deg
 
     def pixel(self, lat_deg, lon_deg):
-        """Fractional pixel coordinates (row, col) of a place."""
+        """Fractional pixel coordinates (row, col) of a position."""
         return (self.north_deg - lat_deg) / self.step_deg - 0.5, (lon_deg - self.west_deg) / self.step_deg - 0.5
 
     def at(self, row, col):

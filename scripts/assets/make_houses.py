@@ -1,4 +1,4 @@
-"""The town of `benches/houses.toml`: a house (house.glb) and 5000 places for it (places.csv). Python's own library is enough.
+"""The town of `benches/houses.toml`: a house (house.glb) and 5000 positions for it (places.csv). Python's own library is enough.
 
 A house is 12 m long and 9 m wide, with a gable roof that hangs over, a chimney, a door and 14 windows: 246 triangles in the colours of their
 corners. The town lies where the flight of the demo passes at 26 s: rows of houses 40 m apart, none quite straight.
@@ -46,7 +46,7 @@ class Shape:
         self.face([(x0, y0, z0), (x1, y0, z0), (x1, y0, z1), (x0, y0, z1)], color)
 
     def window(self, axis, wall, outwards, along, bottom, size):
-        """A pane a hand before its wall: `axis` 0 or 2 is the wall's normal, `wall` its place on it."""
+        """A pane a hand before its wall: `axis` 0 or 2 is the wall's normal, `wall` its position on it."""
         (left, right), top = (along - 0.5 * size[0], along + 0.5 * size[0]), bottom + size[1]
         near, far = sorted((wall, wall + outwards * 0.06))
         low, high = ((near, bottom, left), (far, top, right)) if axis == 0 else ((left, bottom, near), (right, top, far))
@@ -126,7 +126,7 @@ def write_glb(shape, path, generator="make_houses.py"):
 
 
 def part(i, k):
-    """Number k of place i, 0 to 1: the same on every machine."""
+    """Number k of position i, 0 to 1: the same on every machine."""
     x = (i * 3 + k + 1) * 0x9E3779B97F4A7C15 & (1 << 64) - 1
     x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9 & (1 << 64) - 1
     x = (x ^ x >> 27) * 0x94D049BB133111EB & (1 << 64) - 1
@@ -145,7 +145,7 @@ def centre():
     return row["lat_deg"] + AHEAD_M * math.cos(yaw) * north, row["lon_deg"] + AHEAD_M * math.sin(yaw) * east, north, east
 
 
-def write_places(path):
+def write_positions(path):
     lat_deg, lon_deg, north, east = centre()
     with path.open("w", newline="\n") as file:
         file.write("lat_deg,lon_deg,heading_deg,scale\n")
@@ -160,4 +160,4 @@ if __name__ == "__main__":
     made = house()
     print(f"{len(made.triangles)} triangles")
     write_glb(made, OUT / "house.glb")
-    write_places(OUT / "places.csv")
+    write_positions(OUT / "places.csv")

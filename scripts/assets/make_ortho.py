@@ -228,12 +228,12 @@ for k in range(8, len(road) - 8):
         tangent = legs[k] * (ground.cell_north_m, ground.cell_east_m)
         tangent = tangent / (np.hypot(*tangent) + 1e-9)
         normal = np.array([-tangent[1], tangent[0]])
-        place = np.array([(r + 0.5) * per_row, (c + 0.5) * per_col]) + side * (7.0 + 2 * rng.random()) * normal
+        position = np.array([(r + 0.5) * per_row, (c + 0.5) * per_col]) + side * (7.0 + 2 * rng.random()) * normal
         half = rng.uniform([1.8, 1.3], [3.6, 2.2])
         if rng.random() < 0.12:
             half *= 1.7
-        ring = [(place + a * half[0] * tangent + b * half[1] * normal)[::-1] * 2 for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        ridge = [(place + a * half[0] * tangent + b * half[1] * normal)[::-1] * 2 for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))]
+        ring = [(position + a * half[0] * tangent + b * half[1] * normal)[::-1] * 2 for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        ridge = [(position + a * half[0] * tangent + b * half[1] * normal)[::-1] * 2 for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))]
         tone = np.array(roofs[rng.integers(len(roofs))])
         draw.polygon([tuple(p) for p in ring], fill=tuple(int(v) for v in tone) + (255,))
         draw.polygon([tuple(p) for p in ridge], fill=tuple(int(v) for v in np.clip(tone * 1.28, 0, 255)) + (255,))

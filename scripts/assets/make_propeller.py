@@ -41,7 +41,7 @@ def blade(angle, first, last):
 def disc(radius, z, depth, count=48):
     """A cone of triangles whose tip is `depth` before z."""
     rim = [(radius * math.cos(t), radius * math.sin(t), z) for t in (2 * math.pi * k / count for k in range(count + 1))]
-    return [place for a, b in zip(rim, rim[1:]) for place in (a, b, (0.0, 0.0, z + depth))]
+    return [point for a, b in zip(rim, rim[1:]) for point in (a, b, (0.0, 0.0, z + depth))]
 
 
 def main():
@@ -55,13 +55,13 @@ def main():
     data = b""
     document = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": [], "materials": [], "meshes": [], "scene": 0}
     primitives = []
-    for number, (name, places, colour) in enumerate(parts):
-        places = np.array(places, dtype="<f4")
-        bytes_ = places.tobytes()
+    for number, (name, positions, colour) in enumerate(parts):
+        positions = np.array(positions, dtype="<f4")
+        bytes_ = positions.tobytes()
         document["bufferViews"].append({"buffer": 0, "byteOffset": len(data), "byteLength": len(bytes_)})
-        lowest, highest = places.min(0).tolist(), places.max(0).tolist()
+        lowest, highest = positions.min(0).tolist(), positions.max(0).tolist()
         document["accessors"].append(
-            {"bufferView": number, "componentType": 5126, "count": len(places), "type": "VEC3", "min": lowest, "max": highest}
+            {"bufferView": number, "componentType": 5126, "count": len(positions), "type": "VEC3", "min": lowest, "max": highest}
         )
         factor = {"baseColorFactor": colour, "metallicFactor": 0.0}
         document["materials"].append({"name": name, "doubleSided": True, "pbrMetallicRoughness": factor})

@@ -78,7 +78,7 @@ def find(picture, columns, rows, expected):
         found, corners = cv2.findChessboardCorners(picture, (columns, rows), flags=cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE)
     if not found:
         return None
-    # The detector's own places suffer where the lens bends the rows; the classic refinement does not.
+    # The detector's own positions suffer where the lens bends the rows; the classic refinement does not.
     stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 200, 1e-4)
     corners = cv2.cornerSubPix(picture, corners.reshape(-1, 1, 2).astype(np.float32), (5, 5), (-1, -1), stop).reshape(-1, 2)
     # A chessboard may be counted from either end.

@@ -187,13 +187,13 @@ def kml():
     document = simplekml.Kml()
     track = document.newgxtrack(name="flight", altitudemode=simplekml.AltitudeMode.absolute)
     stamps = [(START + datetime.timedelta(seconds=float(t))).isoformat(timespec="milliseconds").replace("+00:00", "Z") for t in times(10)]
-    places = [geodetic(t) for t in times(10)]
+    positions = [geodetic(t) for t in times(10)]
     track.newwhen(stamps)
-    track.newgxcoord([(lon, lat, alt) for lat, lon, alt in places])
+    track.newgxcoord([(lon, lat, alt) for lat, lon, alt in positions])
     track.newgxangle([tuple(np.degrees([RATE * t, PITCH, BANK])) for t in times(10)])
     document.save(str(OUT / "track.kml"))
     document = simplekml.Kml()
-    line = document.newlinestring(name="path", coords=[(lon, lat, alt) for lat, lon, alt in places[:20]])
+    line = document.newlinestring(name="path", coords=[(lon, lat, alt) for lat, lon, alt in positions[:20]])
     line.altitudemode = simplekml.AltitudeMode.absolute
     document.save(str(OUT / "path.kml"))
 

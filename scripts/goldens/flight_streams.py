@@ -144,10 +144,10 @@ def bag(name, topics):
 
 def bags():
     left = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
-    place = np.array([100.0, 50.0, 0.0])
+    position = np.array([100.0, 50.0, 0.0])
 
-    def in_odom(t, at=place):
-        """Pose of the body in `odom`, which lies in `map` at a place, turned left by 90 degrees."""
+    def in_odom(t, at=position):
+        """Pose of the body in `odom`, which lies in `map` at a position, turned left by 90 degrees."""
         matrix = AXES["enu"].T @ attitude() @ AXES["flu"]
         return left.T @ (AXES["enu"].T @ ned(t) - at), xyzw(left.T @ matrix)
 
@@ -164,19 +164,19 @@ def bags():
         (t, odometry(t, "odom", child, shift=shift)) for t in times() for child, shift in (("base_link", 0.0), ("payload", 40.0))]})
     quarter = xyzw(left)
     bag("tf_static_parent.mcap", {
-        "/tf_static": [(1.0, transforms((1.0, "map", "odom", place, quarter)))],
+        "/tf_static": [(1.0, transforms((1.0, "map", "odom", position, quarter)))],
         "/tf": lambda t: transforms((t, "odom", "base_link", *in_odom(t)))})
     # The parent moves by 2 m/s, and is sent once a second.
-    moving = lambda t: place + np.array([2.0 * t, 0.0, 0.0])
+    moving = lambda t: position + np.array([2.0 * t, 0.0, 0.0])
     bag("tf_moving_parent.mcap", {"/tf": [
         (t, transforms((t, "odom", "base_link", *in_odom(t, moving(t))),
                        *([(t, "map", "odom", moving(t), quarter)] if t % 1 == 0 else []))) for t in times()]})
     bag("odom_below_map.mcap", {
         "/odom": lambda t: odometry(t, "odom", "base_link"),
-        "/tf": lambda t: transforms((t, "odom", "base_link", *pose("enu", "flu", t)), (t, "map", "odom", place, quarter))})
+        "/tf": lambda t: transforms((t, "odom", "base_link", *pose("enu", "flu", t)), (t, "map", "odom", position, quarter))})
     # Two vehicles whose frames have the same names.
-    bag("two_vehicles.mcap", {f"/uav{number}/tf": lambda t, at=at: transforms((t, "odom", "base_link", *in_odom(t, at)), (t, "map", "odom", place, quarter))
-                              for number, at in ((1, place), (2, place + 40.0))})
+    bag("two_vehicles.mcap", {f"/uav{number}/tf": lambda t, at=at: transforms((t, "odom", "base_link", *in_odom(t, at)), (t, "map", "odom", position, quarter))
+                              for number, at in ((1, position), (2, position + 40.0))})
     # A sensor that is turned on the vehicle.
     bag("imu_mount.mcap", {
         "/fix": fix, "/imu": lambda t: imu(t, "imu_link", "enu", "flu"),

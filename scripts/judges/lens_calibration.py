@@ -81,7 +81,7 @@ def is_fisheye(c):
 NOTES = """Pairs are RMS and largest distance. A found lens is compared where it images the rays of every fourth pixel, in rows and columns, of the cells of
 24 px in which there were corners.
 
-*Turned*: the poses of a calibration take up any turn of the camera about its place, so a lens is known but for that. The axis of a fisheye is its centre
+*Turned*: the poses of a calibration take up any turn of the camera about its position, so a lens is known but for that. The axis of a fisheye is its centre
 of symmetry, and is found. Tilt, prism and tangential terms trade with the principal point: the 14 parameters are judged after the turn that makes the
 differences least. Focal length and principal point of the double sphere are compared with those of the nearest Kannala-Brandt lens.
 
@@ -143,7 +143,7 @@ def cells(px):
 
 
 def make_poses(c, points, seed):
-    """Of some random poses that show the whole board each time the one that shows it in most new places."""
+    """Of some random poses that show the whole board each time the one that shows it in most new positions."""
     random, poses, covered = np.random.default_rng(seed), [], set()
     while len(poses) < POSES:
         found = []
@@ -180,18 +180,18 @@ def render(program, c, poses, folder):
 
 def calibrate(c, points, corners):
     """Reprojection RMS and camera that OpenCV finds."""
-    size, places = (c["width"], c["height"]), [points.reshape(1, -1, 3)] * len(corners)
+    size, positions = (c["width"], c["height"]), [points.reshape(1, -1, 3)] * len(corners)
     corners = [px.reshape(1, -1, 2) for px in corners]
     if is_fisheye(c):
         # OpenCV 4 has them in cv2.fisheye.
         flags = sum(getattr(cv2.fisheye, name, None) or getattr(cv2, name) for name in ("CALIB_RECOMPUTE_EXTRINSIC", "CALIB_FIX_SKEW"))
         stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 300, 1e-12)
-        rms, K, k, *_ = cv2.fisheye.calibrate(places, corners, size, None, None, flags=flags, criteria=stop)
+        rms, K, k, *_ = cv2.fisheye.calibrate(positions, corners, size, None, None, flags=flags, criteria=stop)
         return rms, camera_of(c, K, k, kannala_brandt)
     flags = cv2.CALIB_RATIONAL_MODEL | cv2.CALIB_THIN_PRISM_MODEL | cv2.CALIB_TILTED_MODEL
     stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 1000, 1e-14)
-    places, corners = ([value.astype(np.float32) for value in values] for values in (places, corners))
-    rms, K, k, *_ = cv2.calibrateCamera(places, corners, size, None, None, flags=flags, criteria=stop)
+    positions, corners = ([value.astype(np.float32) for value in values] for values in (positions, corners))
+    rms, K, k, *_ = cv2.calibrateCamera(positions, corners, size, None, None, flags=flags, criteria=stop)
     return rms, camera_of(c, K, k, by_opencv)
 
 

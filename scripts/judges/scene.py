@@ -117,9 +117,9 @@ def main(folder):
     rows = ["t_s,n_m,e_m,d_m,roll_deg,pitch_deg,yaw_deg"]
     for i in range(40):
         t = 0.1 * i
-        place = (-3.0 + 0.25 * t, 0.5 * math.sin(0.8 * t) - 0.1, 0.25 * math.cos(1.1 * t))
+        position = (-3.0 + 0.25 * t, 0.5 * math.sin(0.8 * t) - 0.1, 0.25 * math.cos(1.1 * t))
         turn = (4 * math.sin(t), 3 * math.cos(0.9 * t), 6 * math.sin(0.7 * t))
-        rows.append(",".join(str(value) for value in (t, *place, *turn)))
+        rows.append(",".join(str(value) for value in (t, *position, *turn)))
     (folder / "log.csv").write_text("\n".join(rows) + "\n")
     for name, keys in KINDS.items():
         (folder / f"{name}.toml").write_text(SCENE.format(**keys))

@@ -48,7 +48,7 @@ Examples:
 Exit codes:
   0  success
   1  failure during the run (disk, GPU, a check that did not pass)
-  2  wrong usage or invalid input; the message names the place and a remedy
+  2  wrong usage or invalid input; the message names the location and a remedy
   3  no usable graphics adapter where one is demanded
   130  stopped by Ctrl-C or SIGTERM after the current frames: all files are complete, and the message tells how
      to resume; a second one ends at once. Where a shell has it ignored, in the background of a script,

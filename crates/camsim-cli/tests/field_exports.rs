@@ -118,8 +118,8 @@ fn cameras_are_chosen_by_name_and_left_out_without_frames() {
     fs::create_dir_all(slow.join("case")).unwrap();
     let folder = case("44-stereo-baseline-exports");
     let text = read(folder.clone());
-    let place = text.rfind("fps = 10.0").unwrap();
-    fs::write(slow.join("case/s.toml"), format!("{}fps = 0.5{}", &text[..place], &text[place + 10..]))
+    let offset = text.rfind("fps = 10.0").unwrap();
+    fs::write(slow.join("case/s.toml"), format!("{}fps = 0.5{}", &text[..offset], &text[offset + 10..]))
         .unwrap();
     fs::copy(folder.with_file_name("f.csv"), slow.join("case/f.csv")).unwrap();
     fs::copy(folder.parent().unwrap().with_file_name("acircles.png"), slow.join("acircles.png")).unwrap();

@@ -146,8 +146,8 @@ fn frames_of_a_flight_on_earth_have_latitude_and_longitude() {
     let row = &frames(&base.path().join("out"))[0];
     let value = |name: &str| row[name].parse::<f64>().unwrap();
     let earth = LocalFrame::new(Geodetic::from_deg(38.9492, -107.0698, 2810.0));
-    let place = Geodetic::from_deg(value("lat_deg"), value("lon_deg"), value("height_m"));
-    let away_m = earth.ned_from_geodetic(place) - DVec3::new(value("n"), value("e"), value("d"));
+    let position = Geodetic::from_deg(value("lat_deg"), value("lon_deg"), value("height_m"));
+    let away_m = earth.ned_from_geodetic(position) - DVec3::new(value("n"), value("e"), value("d"));
     assert!(away_m.length() < 1e-6, "{away_m}");
 }
 
@@ -173,7 +173,7 @@ fn copied_folder_reproduces_the_same_bytes() {
     let camera = String::from_utf8(made[Path::new("camera.toml")].clone()).unwrap();
     assert!(camera.contains("vignette = \"scene/vignette.png\""), "{camera}");
 
-    // In another place, without the first folder, from another working directory, by the folder's own
+    // At another path, without the first folder, from another working directory, by the folder's own
     // scenario.
     fs::create_dir_all(path("far/away")).unwrap();
     fs::create_dir_all(path("work")).unwrap();

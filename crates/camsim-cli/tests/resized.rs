@@ -21,7 +21,7 @@ impl Picture {
         self.values[y * self.width + x]
     }
 
-    /// Root mean square difference from what `expected` makes of the place of each pixel.
+    /// Root mean square difference from what `expected` makes of the position of each pixel.
     fn rms(&self, expected: impl Fn(usize, usize) -> [f64; 3]) -> f64 {
         let mut squares = 0.0;
         for (i, value) in self.values.iter().enumerate() {

@@ -58,10 +58,10 @@ fn stamps(path: &Path) -> Vec<i64> {
 fn render_its_shards_and_track_write_the_same_tables() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path();
-    let place = "origin = [46.7, 9.85, 2100.0]\n";
+    let origin = "origin = [46.7, 9.85, 2100.0]\n";
     let others = "[[gnss]]\nname = \"gnss0\"\n[[barometer]]\nname = \"baro0\"\n\
         [[magnetometer]]\nname = \"mag0\"\ndate = \"2026-11-27\"\n";
-    write_scenario(folder, &format!("{FLIGHT}{place}"), &format!("{IMU}{others}"));
+    write_scenario(folder, &format!("{FLIGHT}{origin}"), &format!("{IMU}{others}"));
     let backend = ["--backend", "cpu", "-q"];
     let (code, err) = on(folder, "render", &["-o", "all"], &backend);
     assert_eq!(code, 0, "{err}");
@@ -96,7 +96,7 @@ fn render_its_shards_and_track_write_the_same_tables() {
     assert!(imu[0] + 999_000_000 < frames[0] && frames[frames.len() - 1] + 999_000_000 < imu[600]);
 
     // Another sensor leaves the frames as they are, unless they are to be resumed.
-    write_scenario(folder, &format!("{FLIGHT}{place}"), &IMU.replace("imu0", "imu1"));
+    write_scenario(folder, &format!("{FLIGHT}{origin}"), &IMU.replace("imu0", "imu1"));
     let (code, err) = on(folder, "render", &["-o", "all"], &["--backend", "cpu"]);
     assert!(code == 0 && !err.contains("another scenario"), "{err}");
     let names: Vec<String> = files(&folder.join("all")).into_keys().collect();

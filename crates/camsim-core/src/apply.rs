@@ -313,7 +313,7 @@ impl<'a> Pipeline<'a> {
             optics.expose(&mut frame, None);
         }
         if let Some(sensor) = ImageSensor::new(self.spec, self.settings.seed) {
-            // These frames have no place on a clock: the stamp is 0.
+            // These frames have no time on a clock: the stamp is 0.
             sensor.expose(&mut frame, 0.0, None);
         }
         (frame, counts)
@@ -459,10 +459,10 @@ impl<'a> Pipeline<'a> {
         }
         let steps = self.motion.instants(exposure_s);
         let [width, height] = self.camera.size_px;
-        let places = (0..63_u32).map(|i| [(i % 9) * (width - 1) / 8, (i / 9) * (height - 1) / 6]);
+        let pixels = (0..63_u32).map(|i| [(i % 9) * (width - 1) / 8, (i / 9) * (height - 1) / 6]);
         let ideal = &self.frame.geometry;
         let (mut longest, mut miss) = (0.0_f64, 0.0_f64);
-        for [x, y] in places {
+        for [x, y] in pixels {
             let Some(uv) = self.camera.unproject(DVec2::new(f64::from(x), f64::from(y))) else { continue };
             let w = self.inverse_depth_of_ray(uv);
             let mid_s = self.shutter.dt_pixel_s(x, y);

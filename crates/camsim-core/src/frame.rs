@@ -25,7 +25,7 @@ pub struct RowRecord {
 /// Floats per pixel of [`RenderedFrame::coords`].
 pub const COORDS_CHANNELS: usize = Channel::Coords.components().len();
 
-/// Direction of a ray (u, v) of a camera in NED, of length 1. `coords` has it in place of a point where the
+/// Direction of a ray (u, v) of a camera in NED, of length 1. `coords` has it instead of a point where the
 /// ray shows the sky.
 #[must_use]
 pub fn sky_direction_ned(pose: &CameraPose, uv: DVec2) -> DVec3 {
@@ -142,7 +142,7 @@ impl RenderedFrame {
         self.planes.iter_mut().find(|plane| plane.channel == channel).map(|plane| &mut plane.values)
     }
 
-    /// Adds a channel, in place of the values that it has.
+    /// Adds a channel, instead of the values that it has.
     pub fn set(&mut self, channel: Channel, values: PlaneValues) {
         match self.values_mut(channel) {
             Some(old) => *old = values,

@@ -71,7 +71,7 @@ impl Geodetic {
         )
     }
 
-    /// The place of a position in metres from the Earth's centre: x towards latitude and longitude 0, z north.
+    /// The geodetic position of a point in metres from the Earth's centre: x towards latitude and longitude 0, z north.
     ///
     /// Bowring's iteration on the reduced latitude beta (Bowring 1976, Survey Review 23:323-327), run to
     /// convergence: `tan lat = (z + e'^2 b sin^3 beta) / (p - e2 a cos^3 beta)`, `tan beta = (1 - f) tan

@@ -293,7 +293,7 @@ impl RowJob<'_> {
         }
     }
 
-    /// Electrons in place of their means.
+    /// Electrons instead of their means.
     fn count(&self, scratch: &mut RowScratch) {
         let (settings, draws) = (&self.exposed.settings, self.sensor.draws);
         let full_e = settings.full_well_e;

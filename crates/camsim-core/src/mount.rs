@@ -99,7 +99,7 @@ impl CameraPath {
         })
     }
 
-    /// The path of a camera at the same place whose axes are turned.
+    /// The path of a camera at the same position whose axes are turned.
     #[must_use]
     pub fn turned(&self, camera_from_turned: DQuat) -> Self {
         Self { body_from_camera: self.body_from_camera * camera_from_turned, ..self.clone() }
@@ -203,14 +203,14 @@ pub fn mount_angles_deg(body_from_camera_axes: DQuat) -> [f64; 3] {
     let degrees = |angles: [f64; 3]| angles.map(|angle| angle.to_degrees() + 0.0);
     let candidates = [degrees(upright), degrees([roll, pitch, yaw])];
     let shortest = candidates.into_iter().find_map(|angles| {
-        (0..=13).map(|places| angles.map(|angle| rounded(angle, places))).find(|angles| is_same(*angles))
+        (0..=13).map(|decimals| angles.map(|angle| rounded(angle, decimals))).find(|angles| is_same(*angles))
     });
     shortest.unwrap_or(candidates[1])
 }
 
 /// An angle rounded to decimal places; -180 is 180.
-fn rounded(angle_deg: f64, places: i32) -> f64 {
-    let scale = 10f64.powi(places);
+fn rounded(angle_deg: f64, decimals: i32) -> f64 {
+    let scale = 10f64.powi(decimals);
     let short = (angle_deg * scale).round() / scale + 0.0;
     if short == -180.0 { 180.0 } else { short }
 }

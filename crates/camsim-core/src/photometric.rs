@@ -78,8 +78,8 @@ pub fn vignette_weight(value: f32, thresholds: [f64; 2]) -> f32 {
 /// thresholds.
 #[must_use]
 pub fn vignette_weights(map: &GrayImage, size_px: [u32; 2], thresholds: [f64; 2]) -> Vec<f32> {
-    let place = |x, y| DVec2::new(x, y);
-    let values = resampled(map, size_px, size_px, place);
+    let position = |x, y| DVec2::new(x, y);
+    let values = resampled(map, size_px, size_px, position);
     values.into_iter().map(|value| vignette_weight(value, thresholds)).collect()
 }
 
@@ -87,17 +87,17 @@ pub fn vignette_weights(map: &GrayImage, size_px: [u32; 2], thresholds: [f64; 2]
 /// ([`crate::scenario::CameraSpec::files_of`]).
 #[must_use]
 pub fn vignette_part(map: &GrayImage, files_of: &FilesOfSpec, size_px: [u32; 2]) -> GrayImage {
-    let place = |x, y| files_of.point(DVec2::new(x, y), size_px);
-    GrayImage { size_px, values: resampled(map, size_px, files_of.size_px, place) }
+    let position = |x, y| files_of.point(DVec2::new(x, y), size_px);
+    GrayImage { size_px, values: resampled(map, size_px, files_of.size_px, position) }
 }
 
-/// Values of a map, which covers a picture of the size `covered_px`, at the places in it that the pixels of a
+/// Values of a map, which covers a picture of the size `covered_px`, at the positions in it that the pixels of a
 /// picture have: bilinear between pixel centres, constant beyond the borders.
 fn resampled(
     map: &GrayImage,
     [width, height]: [u32; 2],
     covered_px: [u32; 2],
-    place: impl Fn(f64, f64) -> DVec2,
+    position: impl Fn(f64, f64) -> DVec2,
 ) -> Vec<f32> {
     let axis = |at: f64, covered: u32, in_size: u32| {
         let map_px =
@@ -109,7 +109,7 @@ fn resampled(
     let mut values = Vec::with_capacity((width * height) as usize);
     for y in 0..height {
         for x in 0..width {
-            let at = place(f64::from(x), f64::from(y));
+            let at = position(f64::from(x), f64::from(y));
             let (x0, x1, tx) = axis(at.x, covered_px[0], map.size_px[0]);
             let (y0, y1, ty) = axis(at.y, covered_px[1], map.size_px[1]);
             let top = value(x0, y0) + tx * (value(x1, y0) - value(x0, y0));

@@ -183,7 +183,7 @@ impl Oracle {
         }
     }
 
-    /// Name of the renderer for display, in place of that of an adapter.
+    /// Name of the renderer for display, instead of that of an adapter.
     #[must_use]
     pub fn describe() -> String {
         format!("reference (f64 rays, {} threads)", rayon::current_num_threads())

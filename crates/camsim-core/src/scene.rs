@@ -76,7 +76,7 @@ impl Scene {
     pub fn moving_objects(&self) -> Vec<&str> {
         let moving = self.meshes.iter().filter(|mesh| mesh.motion.is_some());
         let numbers: std::collections::BTreeSet<u32> = moving.map(|mesh| mesh.object).collect();
-        let name = |number: u32| number.checked_sub(1).and_then(|place| self.objects.get(place as usize));
+        let name = |number: u32| number.checked_sub(1).and_then(|index| self.objects.get(index as usize));
         numbers
             .into_iter()
             .map(|number| name(number).map_or("unnamed", |object| object.name.as_str()))

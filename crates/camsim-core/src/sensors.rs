@@ -49,12 +49,12 @@ const MOST_EARLIER: f64 = 10e6;
 /// Why sensors cannot be simulated.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SensorError {
-    /// A sensor that needs the place of the local frame on Earth.
+    /// A sensor that needs the position of the local frame on Earth.
     #[error(
-        "{kind} \"{name}\": {reason} needs the place of the flight on Earth, and the log has local \
+        "{kind} \"{name}\": {reason} needs the position of the flight on Earth, and the log has local \
             coordinates: set flight.origin = [lat_deg, lon_deg, height_m]"
     )]
-    NoPlace {
+    NoPosition {
         /// Table of the scenario.
         kind: &'static str,
         /// Name of the sensor.
@@ -78,7 +78,7 @@ pub enum SensorError {
     /// The camera's mount, for a sensor on it.
     #[error(transparent)]
     Mount(#[from] MountError),
-    /// A place or day without field.
+    /// A position or day without field.
     #[error(
         "magnetometer \"{name}\": the World Magnetic Model has no field there: {problem}; give field_ned_ut"
     )]
@@ -95,7 +95,7 @@ pub enum SensorError {
 pub struct SensorInput {
     /// Motion of the platform.
     pub trajectory: Arc<Trajectory>,
-    /// Place of the local frame.
+    /// Position of the local frame.
     pub earth: Earth,
     /// Time of the written stamps at path time 0, nanoseconds.
     pub epoch_ns: i64,
@@ -189,10 +189,15 @@ impl SensorInput {
         Self { trajectory, earth, epoch_ns, span_s, camera_mount: scenario.camera.mount.clone() }
     }
 
-    /// That the place of the local frame on Earth is known, which `reason` needs.
-    fn check_place(&self, kind: &'static str, name: &str, reason: &'static str) -> Result<(), SensorError> {
-        let no_place = || SensorError::NoPlace { kind, name: name.to_owned(), reason };
-        self.earth.frame().map(|_| ()).ok_or_else(no_place)
+    /// That the position of the local frame on Earth is known, which `reason` needs.
+    fn check_position(
+        &self,
+        kind: &'static str,
+        name: &str,
+        reason: &'static str,
+    ) -> Result<(), SensorError> {
+        let no_position = || SensorError::NoPosition { kind, name: name.to_owned(), reason };
+        self.earth.frame().map(|_| ()).ok_or_else(no_position)
     }
 }
 

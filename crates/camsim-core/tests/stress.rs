@@ -32,9 +32,9 @@ fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
     let (mut square, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
     for direction in 0..12 {
         let half = DVec2::from_angle(f64::from(direction) * 0.53) * (0.5 * length_px);
-        for place in 0..40 {
+        for k in 0..40 {
             let centre = DVec2::new(128.0, 128.0)
-                + DVec2::new((f64::from(place) * 0.618).fract(), (f64::from(place) * 0.37).fract());
+                + DVec2::new((f64::from(k) * 0.618).fract(), (f64::from(k) * 0.37).fract());
             let undistorted =
                 gather(&[centre - half, centre + half], PathStage::Straight, &POINT, color, 2.0, 1024).x;
             let exact = (0..8000)

@@ -5,7 +5,7 @@
 //! conditions lane by lane; here all four channels are read at once, stages that no pixel of a block needs
 //! are skipped, and the output is written in place.
 
-#![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one place in all arrays")]
+#![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one index in all arrays")]
 
 use camsim_core::{noise::tail_segments, temporal::TapStage};
 use camsim_plan::{BlurStage, FramePlan, RayStage};

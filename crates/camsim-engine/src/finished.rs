@@ -72,7 +72,7 @@ impl Finished {
     }
 }
 
-/// The channel `coords`: ray, source, time shift and point of each pixel, with the direction in place of the
+/// The channel `coords`: ray, source, time shift and point of each pixel, with the direction instead of the
 /// point where a valid pixel shows the sky.
 pub(crate) fn coords(
     truth: &[Truth],

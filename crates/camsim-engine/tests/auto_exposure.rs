@@ -88,9 +88,9 @@ fn every_renderer_exposes_a_frame_as_the_reference_does() {
     let mut times_s = Vec::new();
     for frame in [0, 40, 95] {
         let exact = oracle.render(frame, &options);
-        for place in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
+        for backend in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
             let mut engine = engine();
-            engine.set_backend(place);
+            engine.set_backend(backend);
             let found = render(&engine, &sequence, &[Channel::Color], frame);
             let exposure = found.plan.exposure.expect("automatic");
             assert_eq!(Some(exposure), sequence.exposure(frame));
@@ -98,7 +98,7 @@ fn every_renderer_exposes_a_frame_as_the_reference_does() {
             times_s.push(exposure.time_s);
             // `quality.max_error_dn`, and the oracle's own noise.
             let error = rms(&found.frame, &exact) * 255.0;
-            assert!(error < 1.0, "{frame} {place:?}: {error}");
+            assert!(error < 1.0, "{frame} {backend:?}: {error}");
             let mean: f64 = found.frame.color_rgba().chunks_exact(4).map(|p| f64::from(p[1])).sum();
             let mean = mean / (96.0 * 72.0);
             assert!((mean / 0.25 - 1.0).abs() < 0.1, "{frame}: {mean}");

@@ -32,12 +32,13 @@ fn ground() -> Scene {
     let grey = [GREY, GREY, GREY, 255];
     let texture = picture.padded(MARGIN, grey);
     let across = f64::from(side + 2 * MARGIN);
-    let places = || {
+    let positions = || {
         (0..201_u32 * 201).map(|i| [f64::from(i % 201) * 40.0 - 4000.0, 4000.0 - f64::from(i / 201) * 40.0])
     };
-    let points: Vec<DVec3> = places().map(|[east, north]| DVec3::new(north, east, 0.0)).collect();
-    let uvs: Vec<[f32; 2]> =
-        places().map(|[east, north]| [(east / across + 0.5) as f32, (0.5 - north / across) as f32]).collect();
+    let points: Vec<DVec3> = positions().map(|[east, north]| DVec3::new(north, east, 0.0)).collect();
+    let uvs: Vec<[f32; 2]> = positions()
+        .map(|[east, north]| [(east / across + 0.5) as f32, (0.5 - north / across) as f32])
+        .collect();
     let mut terrain = Terrain::new(201, 201, &points, &uvs, Arc::new(texture)).expect("a terrain");
     terrain.beyond = Some(grey);
     Scene { terrain: Some(terrain), sky_linear: [0.0, 0.0, 1.0], ..Scene::default() }

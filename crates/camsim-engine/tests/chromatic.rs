@@ -148,9 +148,10 @@ const BRIGHT: f64 = 204.0 / 255.0;
 fn stripes() -> Scene {
     const SIDE: u32 = 1024;
     let level = |x: u32| {
-        let place = (f64::from(x) + 0.5) / 64.0;
-        let edge = place.round();
-        let rise = 0.5 + 0.5 * (std::f64::consts::FRAC_PI_2 * ((place - edge) * 12.8).clamp(-1.0, 1.0)).sin();
+        let position = (f64::from(x) + 0.5) / 64.0;
+        let edge = position.round();
+        let rise =
+            0.5 + 0.5 * (std::f64::consts::FRAC_PI_2 * ((position - edge) * 12.8).clamp(-1.0, 1.0)).sin();
         let bright = if edge % 2.0 == 1.0 { rise } else { 1.0 - rise };
         (255.0 * (DARK + (BRIGHT - DARK) * bright)).round() as u8
     };
@@ -159,7 +160,7 @@ fn stripes() -> Scene {
     Scene { meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, 128.0)], ..Scene::default() }
 }
 
-/// Place of an edge between dark (0) and bright (1) within some pixels of a row, by the light left and right of it.
+/// Position of an edge between dark (0) and bright (1) within some pixels of a row, by the light left and right of it.
 fn edge_px(values: &[f64], first: usize) -> f64 {
     let rises = values[values.len() - 1] > values[0];
     let dark: f64 = values.iter().map(|value| if rises { 1.0 - value } else { *value }).sum();
@@ -191,12 +192,12 @@ fn fringes_are_as_wide_as_the_lenses_say() {
             if (value(x, y, 1) > 0.5) == (value(x + 1, y, 1) > 0.5) {
                 continue;
             }
-            let place = |k: usize| {
+            let position = |k: usize| {
                 let values: Vec<f64> = (x - 12..x + 14).map(|x| value(x, y, k)).collect();
                 edge_px(&values, x - 12)
             };
             let row = y as f64;
-            let Some(near) = green.unproject(DVec2::new(place(1), row)) else { continue };
+            let Some(near) = green.unproject(DVec2::new(position(1), row)) else { continue };
             // Edges are 8 m apart, 40 m below.
             let u = 0.2 * (near.x / 0.2).round();
             for (camera, k) in [&red, &green, &blue].into_iter().zip([0, 1, 2]) {
@@ -206,9 +207,9 @@ fn fringes_are_as_wide_as_the_lenses_say() {
                     ideal.y -= (camera.project(ideal).y - row) / 200.0;
                 }
                 let expected = camera.project(ideal).x;
-                let error = place(k) - expected;
+                let error = position(k) - expected;
                 worst = worst.max(error.abs());
-                widest = widest.max((expected - place(1)).abs());
+                widest = widest.max((expected - position(1)).abs());
                 edges += 1;
             }
         }

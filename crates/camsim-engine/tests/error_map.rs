@@ -136,7 +136,7 @@ fn frames_of_one_ideal_frame_have_separate_maps() {
         .collect();
     assert!(!shared.is_empty(), "no frame shares");
     for (plan, _) in &shared {
-        // Each is run dry at places of its own, and those that are solved in the same way answer for all of
+        // Each is run dry at positions of its own, and those that are solved in the same way answer for all of
         // these.
         let is_alike = |other: &FramePlan| {
             other.shared_frames == plan.shared_frames
@@ -154,7 +154,7 @@ fn frames_of_one_ideal_frame_have_separate_maps() {
     }
 }
 
-/// What is worked out once for all places is worked out in parallel: places that wait for it may not keep its
+/// What is worked out once for all positions is worked out in parallel: positions that wait for it may not keep its
 /// parts from being done.
 #[test]
 fn error_maps_on_all_threads_do_not_deadlock() {
@@ -209,7 +209,7 @@ fn pixel_errors_are_within_the_neighbouring_predictions() {
             (least_px, most_px) = (least_px.min(near_px), most_px.max(near_px));
         }
         eprintln!(
-            "{name}: {:.2} % of {all} within; places {least_px:.2e} to {most_px:.2e} px, {apart} apart",
+            "{name}: {:.2} % of {all} within; positions {least_px:.2e} to {most_px:.2e} px, {apart} apart",
             100.0 * f64::from(within) / f64::from(all)
         );
         assert!(all > PIXELS / 2, "{name}: {all}");

@@ -174,7 +174,7 @@ fn shift(flow: &[f32], i: usize) -> (DVec2, bool) {
     (DVec2::new(flow[3 * i].into(), flow[3 * i + 1].into()), is_visible)
 }
 
-fn place(i: usize) -> DVec2 {
+fn position(i: usize) -> DVec2 {
     DVec2::new((i as u32 % SIZE_PX[0]).into(), (i as u32 / SIZE_PX[0]).into())
 }
 
@@ -192,7 +192,7 @@ fn forward_and_back_again_is_where_it_began() {
         if !is_visible {
             continue;
         }
-        let Some([dx, dy, _]) = read::<3>(&back, place(i) + shift_px, |i| shift(&back, i).1) else {
+        let Some([dx, dy, _]) = read::<3>(&back, position(i) + shift_px, |i| shift(&back, i).1) else {
             continue;
         };
         most_px = most_px.max((shift_px + DVec2::new(dx, dy)).length());
@@ -234,9 +234,9 @@ fn a_frame_is_the_other_one_warped_by_flow() {
         if here.is_none() {
             continue;
         }
-        let warped = read::<4>(other.color_rgba(), place(i) + shift_px, |i| object(&other, i) == here);
+        let warped = read::<4>(other.color_rgba(), position(i) + shift_px, |i| object(&other, i) == here);
         let Some(warped) = warped else { continue };
-        let seen = (place(i) + shift_px).round().as_u64vec2();
+        let seen = (position(i) + shift_px).round().as_u64vec2();
         let nearest = seen.y as usize * width + seen.x as usize;
         if nearest < width || nearest + width >= flow.len() / 3 {
             continue;

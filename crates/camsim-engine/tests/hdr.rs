@@ -56,10 +56,10 @@ fn by_all(sequence: &Arc<Sequence>) -> Vec<(String, RenderedFrame)> {
     let options = RenderOptions { min_samples: 1024, max_samples: 1024, ..RenderOptions::default() };
     let exact = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
     let mut all = vec![("reference".to_owned(), exact)];
-    for place in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
+    for backend in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
         let mut engine = engine();
-        engine.set_backend(place);
-        all.push((format!("{place:?}"), render(&engine, sequence, &[Channel::Color], 0).frame));
+        engine.set_backend(backend);
+        all.push((format!("{backend:?}"), render(&engine, sequence, &[Channel::Color], 0).frame));
     }
     all
 }

@@ -48,15 +48,15 @@ fn every_renderer_gives_the_same_numbers() {
     let exact = by_oracle(&sequence);
     let expected = exact.raw().expect("a raw picture");
     assert_eq!((expected.channels, expected.values.len()), (1, 80 * 60));
-    for place in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
+    for backend in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
         let mut engine = engine();
-        engine.set_backend(place);
+        engine.set_backend(backend);
         let frame = render(&engine, &sequence, &[Channel::Color], 0).frame;
         let raw = frame.raw().expect("a raw picture");
         let different = raw.values.iter().zip(&expected.values).filter(|(a, b)| a != b).count();
         let largest = raw.values.iter().zip(&expected.values).map(|(a, b)| a.abs_diff(*b)).max();
         // Halves hold these colours; sums of their taps may round by 1e-7 of 3000 electrons.
-        assert!(different <= 5 && largest <= Some(1), "{place:?}: {different}");
+        assert!(different <= 5 && largest <= Some(1), "{backend:?}: {different}");
     }
 }
 

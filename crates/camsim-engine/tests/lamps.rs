@@ -80,13 +80,13 @@ fn small_lamps_have_their_light() {
             eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, reference: {exact:.3?}");
             // Its samples are 1024 a pixel: 256 in all meet a lamp of half a pixel, with 6 % for random ones.
             assert!(worst(&exact) < 0.08, "{side_px} {streak_px} {above_m}: {exact:?}");
-            for place in [Backend::Cpu, Backend::Gpu] {
+            for backend in [Backend::Cpu, Backend::Gpu] {
                 let mut engine = engine();
-                engine.set_backend(place);
+                engine.set_backend(backend);
                 let found = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
                 let found = fractions(&found, side_px);
-                eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, {place:?}: {found:.3?}");
-                assert!(worst(&found) < 0.04, "{side_px} {streak_px} {above_m}, {place:?}: {found:?}");
+                eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, {backend:?}: {found:.3?}");
+                assert!(worst(&found) < 0.04, "{side_px} {streak_px} {above_m}, {backend:?}: {found:?}");
             }
         }
     }
@@ -108,15 +108,15 @@ fn small_lamps_have_their_light_through_a_lens_and_a_readout() {
             let options = RenderOptions { max_samples: 4096, ..RenderOptions::default() };
             let exact = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
             let exact = fractions(exact.color_rgba(), side_px);
-            for place in [Backend::Cpu, Backend::Gpu] {
+            for backend in [Backend::Cpu, Backend::Gpu] {
                 let mut engine = engine();
-                engine.set_backend(place);
+                engine.set_backend(backend);
                 let found = render(&engine, &sequence, &[Channel::Color], 0).frame.into_color();
                 let found = fractions(&found, side_px);
                 let fraction: [f64; 4] = std::array::from_fn(|i| found[i] / exact[i]);
-                eprintln!("{name}, {side_px} px, {place:?}: {fraction:.3?}");
+                eprintln!("{name}, {side_px} px, {backend:?}: {fraction:.3?}");
                 // Both have 1000 rays or more through a lamp of half a pixel.
-                assert!(worst(&fraction) < 0.05, "{name} {side_px} {place:?}: {fraction:?}");
+                assert!(worst(&fraction) < 0.05, "{name} {side_px} {backend:?}: {fraction:?}");
             }
         }
     }

@@ -28,16 +28,16 @@ fn grey(name: &str) -> Arc<Sequence> {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn cameras_of_one_seed_have_independent_noise() {
-    let of = |name: &str, place: Option<Backend>| {
+    let of = |name: &str, backend: Option<Backend>| {
         let sequence = grey(name);
-        let Some(place) = place else {
+        let Some(backend) = backend else {
             return Oracle::new(sequence)
                 .expect("an oracle")
                 .render(0, &RenderOptions::default())
                 .into_color();
         };
         let mut engine = engine();
-        engine.set_backend(place);
+        engine.set_backend(backend);
         render(&engine, &sequence, &[Channel::Color], 0).frame.into_color()
     };
     let rms = |a: &[f32], b: &[f32]| {
@@ -48,10 +48,10 @@ fn cameras_of_one_seed_have_independent_noise() {
         // Two independent values of sigma 0.02; 3600 of them, so within 1.2 % (one standard error).
         assert!((rms(a, b) / (2.0_f64.sqrt() * 0.02) - 1.0).abs() < 0.06, "{}", rms(a, b));
     }
-    for place in [Backend::GpuThenCpu, Backend::Gpu] {
+    for backend in [Backend::GpuThenCpu, Backend::Gpu] {
         for (name, exact) in [("", &unnamed), ("left", &left)] {
             // 0.5 is stored with the 11 bits of a half at worst: 1/4096; the noise itself agrees to rounding.
-            assert!(rms(&of(name, Some(place)), exact) < 3e-4, "{place:?} {name}");
+            assert!(rms(&of(name, Some(backend)), exact) < 3e-4, "{backend:?} {name}");
         }
     }
 }

@@ -132,8 +132,8 @@ fn wrong_values_are_found() {
 fn fraction(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
     let view = oracle.view(0);
     let scene = &oracle.sequence().scene;
-    let object = |place: DVec2, phase: f64| {
-        let hit = view.sample(pixel, place, phase).and_then(|sample| sample.hit);
+    let object = |position: DVec2, phase: f64| {
+        let hit = view.sample(pixel, position, phase).and_then(|sample| sample.hit);
         hit.map_or(0, |hit| scene.object_of_surface(hit.surface))
     };
     let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(per_side) - 0.5;

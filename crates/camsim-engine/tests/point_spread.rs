@@ -65,15 +65,15 @@ fn every_renderer_spreads_its_light() {
     assert!((4000..96 * 72).contains(&valid), "some corners have no ray: {valid}");
     let change_db = psnr_db(&exact, &exact_sharp);
     assert!(change_db < 35.0, "the picture changes: {change_db} dB");
-    for place in [Backend::Cpu, Backend::Gpu] {
+    for backend in [Backend::Cpu, Backend::Gpu] {
         let mut engine = engine();
-        engine.set_backend(place);
+        engine.set_backend(backend);
         let error = |sequence: &Arc<Sequence>, exact: &RenderedFrame| {
             psnr_db(&render(&engine, sequence, &[Channel::Color], 0).frame, exact)
         };
         // Blur keeps no more of the error than the sharp picture has; noise is the same to the bit.
         let (of_sharp, of_blurred) = (error(&sharp, &exact_sharp), error(&blurred, &exact));
-        assert!(of_blurred > of_sharp.max(40.0), "{place:?}: {of_sharp} dB sharp, {of_blurred} dB blurred");
+        assert!(of_blurred > of_sharp.max(40.0), "{backend:?}: {of_sharp} dB sharp, {of_blurred} dB blurred");
     }
 }
 

@@ -94,10 +94,10 @@ fn buildings() -> Scene {
     let mut dice = Dice { seed: 99, thrown: 0 };
     let mut scene = pattern(8000.0);
     for i in 0..36 {
-        let place =
+        let centre =
             [f64::from(i % 6) - 2.5, f64::from(i / 6) - 2.5].map(|k| 60.0 * k + dice.within(-12.0, 12.0));
         let (half, height) = ([dice.within(5.0, 18.0), dice.within(5.0, 18.0)], dice.within(5.0, 35.0));
-        scene.meshes.push(building(place, half, height));
+        scene.meshes.push(building(centre, half, height));
     }
     scene
 }

@@ -52,17 +52,17 @@ fn skyline_is_exact_from_a_distant_ideal_frame() {
     // At the first and the last line the wall is up to 1.3 px elsewhere in the ideal frame, and as much more
     // with twice the speed.
     for exposure_ms in [0.0, 6.0] {
-        let made = |speed_m_s: f64, place: Backend| {
+        let made = |speed_m_s: f64, backend: Backend| {
             let sequence = flying_past(exposure_ms, speed_m_s);
             let mut engine = engine();
-            engine.set_backend(place);
+            engine.set_backend(backend);
             let done = common::render(&engine, &sequence, &[Channel::Color], 0);
             let truth = Oracle::new(sequence).expect("oracle").render(0, &RenderOptions::default());
             rms_dn(done.frame.color_rgba(), truth.color_rgba())
         };
-        for place in [Backend::GpuThenCpu, Backend::Gpu] {
-            let [still, slow, fast] = [0.0, 30.0, 60.0].map(|speed_m_s| made(speed_m_s, place));
-            eprintln!("{exposure_ms} ms, {place:?}: {still:.3}, {slow:.3}, {fast:.3}/255");
+        for backend in [Backend::GpuThenCpu, Backend::Gpu] {
+            let [still, slow, fast] = [0.0, 30.0, 60.0].map(|speed_m_s| made(speed_m_s, backend));
+            eprintln!("{exposure_ms} ms, {backend:?}: {still:.3}, {slow:.3}, {fast:.3}/255");
             // What stays are stairs of the ideal frame's pixels, which a border aslant by the readout has
             // more of; without the reach the twin leaves 4.6 times what it leaves with it (below).
             assert!(still > 0.5 && slow < 1.4 * still && fast < 1.4 * still, "{still} {slow} {fast}");
@@ -75,9 +75,9 @@ fn skyline_is_exact_from_a_distant_ideal_frame() {
 fn skyline_search_agrees_with_its_twin() {
     let sequence = flying_past(0.0, 60.0);
     let truth = Oracle::new(sequence.clone()).expect("oracle").render(0, &RenderOptions::default());
-    for place in [Backend::GpuThenCpu, Backend::Gpu] {
+    for backend in [Backend::GpuThenCpu, Backend::Gpu] {
         let mut engine = engine();
-        engine.set_backend(place);
+        engine.set_backend(backend);
         let mut session =
             engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
         let mut found = None;
@@ -119,8 +119,8 @@ fn skyline_search_agrees_with_its_twin() {
         }
         let [with, without] =
             squares.map(|squares: f64| 255.0 * (squares / f64::from(SIZE_PX[0] * SIZE_PX[1])).sqrt());
-        eprintln!("{place:?}: {differ} pixels differ; {with:.2}/255 with a reach, {without:.2} without");
-        assert!(differ < 10, "{place:?}: {differ}");
+        eprintln!("{backend:?}: {differ} pixels differ; {with:.2}/255 with a reach, {without:.2} without");
+        assert!(differ < 10, "{backend:?}: {differ}");
         assert!(with < 0.5 * without, "{with} {without}");
     }
 }
@@ -128,12 +128,12 @@ fn skyline_search_agrees_with_its_twin() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn sky_coordinates_are_exact_beside_surfaces() {
-    for (place, exposure_ms) in
+    for (backend, exposure_ms) in
         [(Backend::GpuThenCpu, 0.0), (Backend::Gpu, 0.0), (Backend::GpuThenCpu, 6.0), (Backend::Gpu, 6.0)]
     {
         let sequence = flying_past(exposure_ms, 60.0);
         let mut engine = engine();
-        engine.set_backend(place);
+        engine.set_backend(backend);
         let done = common::render(&engine, &sequence, &[Channel::Color, Channel::Coords, Channel::Depth], 0);
         let options = RenderOptions {
             channels: vec![Channel::Coords, Channel::Depth],
@@ -155,8 +155,8 @@ fn sky_coordinates_are_exact_beside_surfaces() {
             let exact = plan.ideal.px_from_point(rotation * uv.extend(1.0));
             let off_px = exact.distance(DVec2::new(f64::from(of_pixel[2]), f64::from(of_pixel[3])));
             // Single precision, of coordinates up to 500 px, and a path through few nodes.
-            assert!(off_px < 0.01, "{place:?}, {exposure_ms} ms, ({x}, {y}): {off_px} px");
-            // In place of a point the ray's direction at its row's own mid-exposure, of length 1.
+            assert!(off_px < 0.01, "{backend:?}, {exposure_ms} ms, ({x}, {y}): {off_px} px");
+            // Instead of a point the ray's direction at its row's own mid-exposure, of length 1.
             let pose = sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y));
             let way = DVec3::new(f64::from(of_pixel[5]), f64::from(of_pixel[6]), f64::from(of_pixel[7]));
             assert!((way - pose.ned_from_camera * uv.extend(1.0).normalize()).length() < 1e-6, "{way}");
@@ -168,7 +168,7 @@ fn sky_coordinates_are_exact_beside_surfaces() {
             );
             sky += 1;
         }
-        assert!(sky > 5000, "{place:?}: {sky}");
+        assert!(sky > 5000, "{backend:?}: {sky}");
     }
 }
 

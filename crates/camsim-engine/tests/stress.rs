@@ -194,7 +194,7 @@ fn a_metre_and_65_km_in_one_frame() {
     check("1 m and 65 km", &sequence, plane, 0.05);
 }
 
-/// [`steady`] about another place and another time.
+/// [`steady`] about another position and another time.
 fn moved(at_ned_m: DVec3, at_s: f64) -> Trajectory {
     let first = BodyState {
         position_ned_m: at_ned_m + DVec3::new(-25.0, -60.0, -120.0),
@@ -208,20 +208,18 @@ fn moved(at_ned_m: DVec3, at_s: f64) -> Trajectory {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn far_from_the_origin_of_place_and_time() {
-    let near_place = DVec3::ZERO;
+fn far_from_the_origin_of_position_and_time() {
+    let near = DVec3::ZERO;
     // 100 km north-east, whole metres and a fraction that f32 would lose (its step there is 8 mm).
-    let far_place = DVec3::new(100_000.013, -99_999.257, -12.0);
-    for (name, place, at_s) in [
-        ("at the origin", near_place, 0.0),
-        ("100 km away", far_place, 0.0),
-        ("at t = 1e9 s", near_place, 1e9),
-    ] {
+    let far = DVec3::new(100_000.013, -99_999.257, -12.0);
+    for (name, position, at_s) in
+        [("at the origin", near, 0.0), ("100 km away", far, 0.0), ("at t = 1e9 s", near, 1e9)]
+    {
         let mut scene = pattern(6000.0);
-        scene.meshes[0].origin_ned_m = place;
-        let mut sequence = sequence(small(rolling(33.0, 8.0), -90.0), moved(place, at_s), scene);
+        scene.meshes[0].origin_ned_m = position;
+        let mut sequence = sequence(small(rolling(33.0, 8.0), -90.0), moved(position, at_s), scene);
         Arc::get_mut(&mut sequence).expect("the only owner").start_s = at_s;
-        check(name, &sequence, Plane { at_ned_m: place, ..GROUND }, 0.05);
+        check(name, &sequence, Plane { at_ned_m: position, ..GROUND }, 0.05);
     }
 }
 

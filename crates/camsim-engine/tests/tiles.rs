@@ -105,7 +105,7 @@ fn tiles_show_what_one_texture_does() {
                 255.0 * mean
             );
             // Half floats below 1 are up to 0.12/255 apart. Where texels are weighed with 8 bits, a read of
-            // black beside white is off by 1/255 at most (2^-9 of it along each axis), and the same place of
+            // black beside white is off by 1/255 at most (2^-9 of it along each axis), and the same position of
             // a tile is not rounded as that of the whole.
             let [most, most_mean] = if is_software(&engine()) { [0.26, 0.002] } else { [2.0, 0.1] };
             assert!(255.0 * largest < most && 255.0 * mean < most_mean, "{largest} {mean}");

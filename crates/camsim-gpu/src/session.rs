@@ -319,7 +319,7 @@ impl GpuSession<'_> {
         let face = plan.camera.lens.face();
         let serves = |target: &SessionTarget| target.face == face && target.ideal.serves(size_px, plan);
         let cached = self.targets.iter().position(serves);
-        let target = cached.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
+        let target = cached.map(|index| self.targets.remove(index)).unwrap_or_else(|| {
             let has_samples = plan.edges != EdgeStage::None || plan.samples_a_pixel > 1;
             let limit = if has_samples { MAX_FINE_TARGETS } else { MAX_TARGETS };
             let is_same_kind =

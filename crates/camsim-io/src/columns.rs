@@ -40,8 +40,8 @@ pub struct Column<R> {
 /// Subjects that only some tables of a kind have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// Places on Earth.
-    Places,
+    /// Positions on Earth.
+    Geodetic,
     /// Exposures that differ.
     Exposures,
     /// Pictures of a burst.

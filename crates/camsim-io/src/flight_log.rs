@@ -191,7 +191,7 @@ fn jump_note(log: &FlightLog) -> Option<Note> {
         from.position_ned_m.distance(to.position_ned_m),
         to.t_s - from.t_s,
         from.t_s,
-        if more > 0 { format!(", and in {more} more places") } else { String::new() }
+        if more > 0 { format!(", and at {more} more times") } else { String::new() }
     )))
 }
 

@@ -5,7 +5,7 @@
 //! | module | has what they share |
 //! |---|---|
 //! | [`reading`] | detection, tables of keys, selection of a camera, poses, timing |
-//! | [`writing`] | the camera as others describe it, and what a format has no place for |
+//! | [`writing`] | the camera as others describe it, and what a format cannot hold |
 //! | [`exporting`] | folders, their pictures, depth, sensors, stamps and pages |
 
 use camsim_core::scenario::DatasetFormat;
@@ -48,7 +48,7 @@ use writing::exported::Writer;
 
 /// An enumeration of formats, each with the row in which its module says what it is.
 macro_rules! formats {
-    ($(#[$about:meta])* $name:ident, $row:ty: $($(#[$doc:meta])* $format:ident => $place:path,)+) => {
+    ($(#[$about:meta])* $name:ident, $row:ty: $($(#[$doc:meta])* $format:ident => $item:path,)+) => {
         $(#[$about])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum $name {
@@ -61,7 +61,7 @@ macro_rules! formats {
 
             fn row(self) -> &'static $row {
                 match self {
-                    $(Self::$format => &$place,)+
+                    $(Self::$format => &$item,)+
                 }
             }
 

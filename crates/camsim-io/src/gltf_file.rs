@@ -208,7 +208,7 @@ impl Model {
 /// Reads a `.gltf` or `.glb` file.
 ///
 /// # Errors
-/// [`GltfError`] names the file and the place in it, or the extension that it needs.
+/// [`GltfError`] names the file and the location in it, or the extension that it needs.
 pub fn read_gltf(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     read_moving_gltf(path, options, &ModelMotion::default())
 }

@@ -18,13 +18,13 @@ use crate::{
 /// A kernel that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum KernelFileError {
-    /// The file, or a place in it.
-    #[error("{}{place}: {problem}", path.display())]
+    /// The file, or a location in it.
+    #[error("{}{location}: {problem}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// `, line N`, or nothing.
-        place: String,
+        location: String,
         /// The problem and the remedy.
         problem: String,
     },
@@ -79,8 +79,8 @@ pub fn read_values(path: &Path) -> Result<ChannelValues, KernelFileError> {
 }
 
 fn fail(path: &Path, line: Option<u64>, problem: impl Into<String>) -> KernelFileError {
-    let place = line.map_or(String::new(), |line| format!(", line {line}"));
-    KernelFileError::Content { path: path.into(), place, problem: problem.into() }
+    let location = line.map_or(String::new(), |line| format!(", line {line}"));
+    KernelFileError::Content { path: path.into(), location, problem: problem.into() }
 }
 
 fn exr(path: &Path) -> Result<ChannelValues, KernelFileError> {
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_no_kernels_are_named_with_the_place() {
+    fn files_that_are_no_kernels_are_named_with_the_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         for (name, text, wanted) in [

@@ -32,13 +32,13 @@ const OFF_GRID: f64 = 1e-3;
 /// A lens table that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LensTableError {
-    /// A place in the file.
-    #[error("{}{place}: {problem}", path.display())]
+    /// A location in the file.
+    #[error("{}{location}: {problem}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// `, line N`, or nothing.
-        place: String,
+        location: String,
         /// The problem and the remedy.
         problem: String,
     },
@@ -112,7 +112,7 @@ const PAIRS: [([&str; 2], Pair); 4] = [
 fn csv_table(path: &Path, pixels: &Pixels) -> Result<LensGrid, LensTableError> {
     let fail = |line: Option<u64>, problem: String| LensTableError::Content {
         path: path.into(),
-        place: line.map_or(String::new(), |line| format!(", line {line}")),
+        location: line.map_or(String::new(), |line| format!(", line {line}")),
         problem,
     };
     let mut reader = open_table(path).map_err(|error| fail(None, error.to_string()))?;
@@ -181,11 +181,11 @@ fn regular(nodes: &[(DVec2, DVec2)]) -> Result<Grid, String> {
         if (at - whole).abs().max_element() > OFF_GRID {
             return Err(format!("the node ({}, {}) is off the regular grid", node.x, node.y));
         }
-        let place = &mut values[whole.y as usize * columns + whole.x as usize];
-        if place.is_finite() {
+        let slot = &mut values[whole.y as usize * columns + whole.x as usize];
+        if slot.is_finite() {
             return Err(format!("the node ({}, {}) is there twice", node.x, node.y));
         }
-        *place = *value;
+        *slot = *value;
     }
     Ok(([first, step], [columns, rows], values))
 }
@@ -199,7 +199,7 @@ fn st_map(path: &Path, pixels: &Pixels) -> Result<LensGrid, LensTableError> {
         _ => {
             let names: Vec<&str> = planes.iter().map(|plane| plane.name.as_str()).collect();
             let problem = format!("an STmap has channels R and G, not {}", names.join(", "));
-            return Err(LensTableError::Content { path: path.into(), place: String::new(), problem });
+            return Err(LensTableError::Content { path: path.into(), location: String::new(), problem });
         }
     };
     let [columns, rows] = planes[s].size_px.map(|side| side as usize);
@@ -232,11 +232,11 @@ pub fn lens_table_csv(camera: &CameraModel, nodes: u32) -> String {
     let rays: Vec<_> = edge.filter_map(|px| camera.ray(px)).collect();
     let widest = rays.iter().map(|ray| ray.truncate().length().atan2(ray.z)).fold(0.0, f64::max);
     let is_wide = widest > 80.0_f64.to_radians();
-    let place = |ray: glam::DVec3| match is_wide {
+    let position = |ray: glam::DVec3| match is_wide {
         true => ray.truncate().normalize_or_zero() * ray.truncate().length().atan2(ray.z),
         false => ray.truncate() / ray.z,
     };
-    let reach = 1.02 * rays.iter().map(|ray| place(*ray).abs()).fold(DVec2::splat(0.1), DVec2::max);
+    let reach = 1.02 * rays.iter().map(|ray| position(*ray).abs()).fold(DVec2::splat(0.1), DVec2::max);
     let mut text = format!("{},x_px,y_px\n", if is_wide { "ax_rad,ay_rad" } else { "u,v" });
     for k in 0..nodes * nodes {
         let fraction = DVec2::new(f64::from(k % nodes), f64::from(k / nodes)) / f64::from(nodes - 1);
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn an_st_map_is_the_undistorted_place_of_every_pixel() {
+    fn an_st_map_is_the_undistorted_position_of_every_pixel() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("map.exr");
         let spec = camera(LensModel::BrownConrady, &[-0.28, 0.07, 2e-4, 2e-5]);
@@ -328,8 +328,8 @@ mod tests {
         let texel = |x: usize, y: usize| {
             // Half the size of the picture.
             let px = (DVec2::new(x as f64, y as f64) + 0.5) * 2.0 - 0.5;
-            let place = pinhole.project(exact.unproject(px).unwrap()) + 0.5;
-            ((place.x / 752.0) as f32, (1.0 - place.y / 480.0) as f32, 0.0_f32)
+            let position = pinhole.project(exact.unproject(px).unwrap()) + 0.5;
+            ((position.x / 752.0) as f32, (1.0 - position.y / 480.0) as f32, 0.0_f32)
         };
         exr::prelude::write_rgb_file(&path, 376, 240, texel).unwrap();
         let table = with_table(&spec, &path).unwrap();
@@ -348,8 +348,8 @@ mod tests {
         std::fs::write(&csv, lens_table_csv(&exact, 97)).unwrap();
         let pinhole = CameraModel::from_spec(&camera(LensModel::Pinhole, &[])).unwrap();
         let texel = |x: usize, y: usize| {
-            let place = pinhole.project(exact.unproject(DVec2::new(x as f64, y as f64)).unwrap()) + 0.5;
-            ((place.x / 752.0) as f32, (1.0 - place.y / 480.0) as f32, 0.0_f32)
+            let position = pinhole.project(exact.unproject(DVec2::new(x as f64, y as f64)).unwrap()) + 0.5;
+            ((position.x / 752.0) as f32, (1.0 - position.y / 480.0) as f32, 0.0_f32)
         };
         exr::prelude::write_rgb_file(&map, 752, 480, texel).unwrap();
         let crop_px = Some([101, 51, 602, 402]);

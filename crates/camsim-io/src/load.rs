@@ -31,9 +31,9 @@ mod far_models;
 mod motion;
 mod objects;
 mod optics;
-mod place_columns;
 mod placements;
 mod pose_table;
+mod position_columns;
 mod scene;
 mod sensors;
 mod track_points;
@@ -90,7 +90,7 @@ pub enum LoadError {
     /// A log with local coordinates in a georeferenced scene.
     #[error(
         "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, \
-            height_m], the place on Earth of the log's (0, 0, 0)"
+            height_m], the position on Earth of the log's (0, 0, 0)"
     )]
     NoOrigin {
         /// The log.
@@ -165,7 +165,7 @@ pub enum LoadError {
     /// A model is farther away than [`MAX_RADIUS_M`].
     #[error(
         "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than \
-            {MAX_RADIUS_M:.0e}: check its place and scale"
+            {MAX_RADIUS_M:.0e}: check its position and scale"
     )]
     TooFar {
         /// The model.
@@ -578,7 +578,7 @@ fn flight_over_terrain_warning(sequence: &Sequence, summary: &TerrainSummary) ->
     }
     if over == 0 && outside < all {
         Some(format!(
-            "the flight is never over ground: {} of {all} places looked at lie over parts of the terrain \
+            "the flight is never over ground: {} of {all} positions looked at lie over parts of the terrain \
              without heights (missing, masked or not plausible)",
             all - outside
         ))
@@ -590,7 +590,7 @@ fn flight_over_terrain_warning(sequence: &Sequence, summary: &TerrainSummary) ->
         ))
     } else if below > 0 {
         Some(format!(
-            "the camera is below the ground in {below} of {all} places looked at: check flight.height, \
+            "the camera is below the ground in {below} of {all} positions looked at: check flight.height, \
              scene.terrain.height and scene.terrain.height_unit"
         ))
     } else {

@@ -1,4 +1,4 @@
-//! Reads every recipe of docs/guide/APPLY.md, with small pictures in place of those that it names.
+//! Reads every recipe of docs/guide/APPLY.md, with small pictures instead of those that it names.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};

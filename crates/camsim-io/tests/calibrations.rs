@@ -123,7 +123,7 @@ fn intrinsics_come_back_to_the_last_bit() {
 /// A rig with everything that a chain holds.
 fn rig() -> Vec<CameraSpec> {
     let mut numbers = Numbers(7);
-    let places = [
+    let cameras = [
         ([0.0, -90.0, 0.0], [0.0, -0.055, 0.0], 0.0, 14.88, Readout::TopToBottom),
         ([1.25, -88.5, 3.0], [0.1, 0.055, -0.02], -5.618_603_727_452_336, 9.6, Readout::BottomToTop),
         ([0.0, 0.0, 180.0], [-0.3, 1e-3, 0.4], 2.5, 0.0, Readout::TopToBottom),
@@ -140,7 +140,7 @@ fn rig() -> Vec<CameraSpec> {
         spec.shutter.readout = readout;
         spec
     };
-    places.into_iter().enumerate().map(of).collect()
+    cameras.into_iter().enumerate().map(of).collect()
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn chains_keep_poses_clocks_and_readouts() {
 }
 
 #[test]
-fn what_a_format_has_no_place_for_is_named() {
+fn what_a_format_cannot_hold_is_named() {
     let mut spec = rig().remove(0);
     spec.fps = 20.5;
     spec.phase = 0.25;

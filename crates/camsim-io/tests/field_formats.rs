@@ -147,8 +147,8 @@ fn solutions_of_rtklib_are_read() {
             .replace("lat/lon/height=WGS84/ellipsoidal", "e/n/u-baseline=WGS84"),
         false => in_meters(line),
     });
-    let from_place = format!("% ref pos   :  47.05  8.31  500.0\n{baseline}");
-    let place: &[&str] = &["line 1 says", "set flight.origin = [47.05, 8.31, 500.0]"];
+    let from_position = format!("% ref pos   :  47.05  8.31  500.0\n{baseline}");
+    let advised: &[&str] = &["line 1 says", "set flight.origin = [47.05, 8.31, 500.0]"];
     let earth = blanks.replace("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)");
     let in_parts = lines(&blanks, |_, line| match line.starts_with('%') {
         true => line.replace("(deg)", "(d'\")"),
@@ -170,10 +170,10 @@ fn solutions_of_rtklib_are_read() {
         ("commas, UTC", commas.replace("GPST,", "UTC,"), track(ellipsoid()), Ok(without_attitude())),
         ("baseline", baseline, track(ellipsoid()), Ok(without_attitude())),
         (
-            "baseline from a place",
-            from_place,
+            "baseline from a position",
+            from_position,
             track(ellipsoid()),
-            Ok(Flight { notes: place, ..without_attitude() }),
+            Ok(Flight { notes: advised, ..without_attitude() }),
         ),
         (
             "from the centre of the Earth",
@@ -279,12 +279,12 @@ fn tables_of_messages_are_read() {
     let mut of_two = "timestamp,GPS.Lat,GPS.Lng,GPS.Alt,GPS.U,GPS2.Lat,GPS2.Lng,GPS2.Alt,GPS2.U\n".to_owned();
     for row in 0..61 {
         let t_s = 0.1 * f64::from(row);
-        let place = |t_s: f64| {
+        let position = |t_s: f64| {
             let (lat, lon) = (47.05 + 7.5 * t_s / 111_180.0, 8.31 + 13.0 * t_s / 76_055.0);
             format!("{lat:.8},{lon:.8},{:.2}", 480.0 + t_s)
         };
-        of_two += &format!("{:.2},{},0,,,,\n", 1_683_194_400.0 + t_s, place(t_s));
-        of_two += &format!("{:.2},,,,,{},1\n", 1_683_194_400.01 + t_s, place(t_s));
+        of_two += &format!("{:.2},{},0,,,,\n", 1_683_194_400.0 + t_s, position(t_s));
+        of_two += &format!("{:.2},,,,,{},1\n", 1_683_194_400.01 + t_s, position(t_s));
     }
     let other: &[&str] =
         &["(`GPS2.U`) says that its receiver was: remove the columns of `GPS`", "61 rows state neither"];

@@ -130,7 +130,7 @@ fn backslashes_of_windows_are_named_with_what_to_write() {
 }
 
 #[test]
-fn a_model_far_from_the_flight_is_named_with_its_place() {
+fn a_model_far_from_the_flight_is_named_with_its_position() {
     let model = |at: &str| format!(r#"gltf = [{{ file = "G09_hugeverts.gltf", at = {at} }}]"#);
     let loaded = load("46-model-far-away", &model("[0.0, 0.0, 0.0]")).unwrap();
     let far = loaded.warnings.iter().find(|warning| warning.contains("km from the flight")).unwrap();

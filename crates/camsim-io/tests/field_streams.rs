@@ -550,10 +550,10 @@ fn fixes_units_and_prose_of_gpx_are_used_or_named() {
 fn altitude_modes_of_kml_are_those_around_the_track() {
     let track = |mode: &str| {
         let times: String = (0..4).map(|s| format!("<when>2023-05-04T10:20:0{s}Z</when>")).collect();
-        let places: String = (0..4)
+        let positions: String = (0..4)
             .map(|s| format!("<gx:coord>8.31 {:.7} {}</gx:coord>", 47.05 + f64::from(s) * 1e-4, 480 + s))
             .collect();
-        format!("<gx:Track>{mode}{times}{places}</gx:Track>")
+        format!("<gx:Track>{mode}{times}{positions}</gx:Track>")
     };
     let kml = |body: &str| {
         format!(
@@ -635,7 +635,7 @@ fn a_span_of_time_begins_a_placemark() {
 }
 
 #[test]
-fn all_equal_times_are_refused_and_one_place_is_not() {
+fn all_equal_times_are_refused_and_one_position_is_not() {
     let point = |lat: f64| {
         format!("<trkpt lat=\"{lat}\" lon=\"8.31\"><ele>480</ele><time>2023-05-04T10:20:00Z</time></trkpt>")
     };

@@ -95,7 +95,7 @@ fn every_format_gives_the_circle() {
             ..case("dji_flight_record.csv", spec(), 201, [0.002, 0.002, 0.01])
         },
         case("track.kml", spec(), 201, [0.002, 0.002, 0.01]),
-        // Metres of height, hundredths of 1.85 m of place.
+        // Metres of height, hundredths of 1.85 m of position.
         Case {
             seconds: 20.0,
             warnings: &["1 of 22 fixes have no GNSS height"],

@@ -106,7 +106,7 @@ fn invalid_placements_and_files_are_refused_by_name() {
             "gltf = [{ file = \"model.gltf\", scale = 1e12 }]",
             "model.gltf reaches 8.7e11 m from the local frame's origin",
         ),
-        ("gltf = [{ file = \"model.gltf\", at = [1e300, 0, 0] }]", "check its place and scale"),
+        ("gltf = [{ file = \"model.gltf\", at = [1e300, 0, 0] }]", "check its position and scale"),
     ] {
         let error = load(folder.path(), LOCAL, scene).unwrap_err();
         assert!(error.contains(expected), "{error}");
@@ -157,7 +157,7 @@ fn models_move_along_paths_and_tables() {
         ("t_s,n_m,e_m,d_m\n1,0,0,0\n1,0,0,0\n", "poses.csv: line 3: its time is not later"),
         ("t_s,n_m,e_m,d_m\n", "has no row"),
         ("t_s,n_m,e_m,d_m\n1,a,0,0\n", "line 2: `a` is no finite number"),
-        ("t_s,lat_deg,lon_deg,height_m\n1,147,0,0\n", "no place on Earth"),
+        ("t_s,lat_deg,lon_deg,height_m\n1,147,0,0\n", "no position on Earth"),
     ] {
         let error = with_table(rows, LOCAL).unwrap_err();
         assert!(error.contains(wanted), "{error}");

@@ -27,7 +27,7 @@ fn before(spec: impl FnOnce(BoardSpec) -> BoardSpec) -> (Arc<Sequence>, Board, B
     (load_sequence(&scenario).expect("a sequence").sequence, read_board(&spec).expect("a board"), spec)
 }
 
-/// Where a frame shows places of a board that stands at the origin.
+/// Where a frame shows positions of a board that stands at the origin.
 struct Eye {
     camera: CameraModel,
     position_ned_m: DVec3,
@@ -52,14 +52,14 @@ impl Eye {
     }
 }
 
-/// Pixels on either side of an edge that its place is found from.
+/// Pixels on either side of an edge that its position is found from.
 const REACH: i64 = 5;
 /// Lines of pixels that a mean is taken over, at least.
 const LEAST_LINES: usize = 12;
 
 /// Mean distance of an edge from where it should be, along the rows or columns of pixels that cross it more
 /// steeply; `None` with few of them in the picture. Light changes from one side to the other once: the fraction
-/// of it that is on the first side, added up, is the edge's place in a line of pixels. What a pixel's filter
+/// of it that is on the first side, added up, is the edge's position in a line of pixels. What a pixel's filter
 /// leaves of its phase is lost in the mean, because neighbouring lines have other phases.
 fn edge_error(frame: &RenderedFrame, eye: &Eye, from_m: DVec2, to_m: DVec2) -> Option<f64> {
     let [from_px, to_px] = [0.1, 0.9].map(|fraction| eye.px(from_m.lerp(to_m, fraction)));
@@ -99,8 +99,8 @@ fn line_error(
     }
     let truth = eye.px(from_m.lerp(to_m, low))[axis];
     let first = truth.round() as i64 - REACH;
-    let places = (first..=first + 2 * REACH).map(|x| light(if axis == 0 { [x, line] } else { [line, x] }));
-    let values = places.collect::<Option<Vec<f64>>>()?;
+    let lights = (first..=first + 2 * REACH).map(|x| light(if axis == 0 { [x, line] } else { [line, x] }));
+    let values = lights.collect::<Option<Vec<f64>>>()?;
     let (one, other) = (values[0], values[values.len() - 1]);
     let even = (values[1] - one).abs().max((values[values.len() - 2] - other).abs()) < 0.02;
     ((one - other).abs() > 0.9 && even)

@@ -17,7 +17,7 @@ use camsim_lab::{
 };
 use camsim_plan::{EdgeStage, FramePlan, Planner};
 
-/// Measured error may be above the predicted one by this much: 32 places stand for the picture, and 4000 of
+/// Measured error may be above the predicted one by this much: 32 positions stand for the picture, and 4000 of
 /// its pixels are measured.
 const ABOVE: f64 = 1.15;
 /// And below it: houses show their grain in a few pixels only.
@@ -113,17 +113,17 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
         }
     }
     // Of all cases a tenth may be outside: distant ground at grazing angles beyond houses, and a lens's fold,
-    // are seen by few of the 32 places.
+    // are seen by few of the 32 positions.
     assert!(
         outside.len() * 10 <= if long { 3 * cases().map_or(0, |all| all.len()) } else { 0 },
         "{outside:#?}"
     );
 }
 
-/// What it costs that sources are beside their place, where a solver or a loose tolerance has them there.
+/// What it costs that sources are beside their position, where a solver or a loose tolerance has them there.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn sources_beside_their_place_cost_what_is_predicted() {
+fn sources_beside_their_position_cost_what_is_predicted() {
     let long = std::env::var_os("CAMSIM_LONG").is_some();
     let engine = Engine::new(AdapterChoice::Software)
         .expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
@@ -168,7 +168,7 @@ fn sources_beside_their_place_cost_what_is_predicted() {
             }
         }
     }
-    assert!(seen >= 4, "only {seen} frames have sources beside their place");
+    assert!(seen >= 4, "only {seen} frames have sources beside their position");
     assert!(outside.len() * 10 <= if long { seen } else { 0 }, "{outside:#?}");
 }
 
@@ -207,7 +207,7 @@ fn a_vibration_that_few_nodes_are_blind_to_is_foretold_and_followed() {
 /// tolerance, and not farther off than those of wider ones.
 #[test]
 fn a_tighter_tolerance_makes_no_worse_picture() {
-    // Times the least error that the cheapest may have, and what sources beside their place may add to it.
+    // Times the least error that the cheapest may have, and what sources beside their position may add to it.
     const NEAR_THE_BEST: f64 = 1.15 * 1.05;
     let long = std::env::var_os("CAMSIM_LONG").is_some();
     for case in cases()
@@ -343,7 +343,7 @@ fn a_coarser_terrain_costs_what_is_predicted() {
             let quality = QualitySpec {
                 max_terrain_error_px,
                 ideal_scale,
-                // Or sources beside their place would be all that is seen.
+                // Or sources beside their position would be all that is seen.
                 max_error_px: 1.0,
                 max_error_dn: 15.0,
                 ..QualitySpec::default()

@@ -93,10 +93,10 @@ pub struct CameraSpec {
     pub shutter: ShutterSpec,
     /// Vignette, light, noise and output encoding.
     pub photometric: PhotometricSpec,
-    /// Image sensor, in place of `light` and `noise_sigma` of `camera.photometric`.
+    /// Image sensor, instead of `light` and `noise_sigma` of `camera.photometric`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<ImageSensorSpec>,
-    /// Exposure that follows the pictures, in place of that of `camera.shutter`.
+    /// Exposure that follows the pictures, instead of that of `camera.shutter`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub auto_exposure: Option<AutoExposureSpec>,
     /// Faults of trigger, stamps and delivery.
@@ -315,7 +315,7 @@ pub struct ShutterSpec {
     pub interlace_ms: FieldOr,
     /// Rows of the earlier field, counted from 0.
     pub first_field: Parity,
-    /// Time from a row to the next, in place of `readout_ms`. It need not be a part of the frame's period.
+    /// Time from a row to the next, instead of `readout_ms`. It need not be a part of the frame's period.
     #[key(
         unit = "us",
         step = 0.1,

@@ -228,7 +228,7 @@ pub static CHANNELS: [ChannelFacts; Channel::ALL.len()] = [
     ChannelFacts { channel: Channel::BlurPath, kind: PlaneKind::Float(&["x0", "y0", "x1", "y1"]), ..FLOW },
 ];
 
-// A channel's place in the table is its number.
+// A channel's index in the table is its number.
 const _: () = {
     let mut i = 0;
     while i < CHANNELS.len() {

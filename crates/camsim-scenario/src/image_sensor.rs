@@ -7,7 +7,7 @@ use super::keys::{Table, Words};
 /// No colours mixed.
 const UNIT_MATRIX: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
-/// Image sensor in terms of EMVA 1288, in place of `light` and `noise_sigma` (docs/reference/IMAGING.md).
+/// Image sensor in terms of EMVA 1288, instead of `light` and `noise_sigma` (docs/reference/IMAGING.md).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageSensorSpec {
@@ -20,12 +20,12 @@ pub struct ImageSensorSpec {
     #[key(unit = "e-", step = 10.0, above = 0.0, hint = "it is what white stands for", example = "8000.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_e: Option<f64>,
-    /// Illuminance on the scene, in place of `white_e`; all light counts as 555 nm. It needs `f_number`,
+    /// Illuminance on the scene, instead of `white_e`; all light counts as 555 nm. It needs `f_number`,
     /// `pixel_um` and `quantum_efficiency`.
     #[key(unit = "lx", step = 10.0, above = 0.0, hint = "it is what white stands for", example = "20000.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_lux: Option<f64>,
-    /// Irradiance on the sensor where it sees white, in place of `white_e`. The light is that of
+    /// Irradiance on the sensor where it sees white, instead of `white_e`. The light is that of
     /// `wavelength_nm`; it needs `pixel_um` and `quantum_efficiency`.
     #[key(unit = "W/m2", step = 0.001, above = 0.0, hint = "it is what white stands for", example = "0.01")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -181,7 +181,7 @@ pub struct ImageSensorSpec {
     #[key(step = 0.01, example = "[[0, 0], [0.2, 0.5], [1, 1]]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub response_points: Vec<[f64; 2]>,
-    /// Lamps in place of steady light.
+    /// Lamps instead of steady light.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flicker: Option<FlickerSpec>,
 }

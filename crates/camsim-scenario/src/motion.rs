@@ -10,7 +10,7 @@ use super::keys::{Table, Words};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionSpec {
-    /// CSV table of poses of the model's origin by time, in place of `path`. Its columns are the time on the
+    /// CSV table of poses of the model's origin by time, instead of `path`. Its columns are the time on the
     /// log's clock (`t_s`, `t_ms`, `t_us` or `t_ns`), `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and
     /// optionally `heading_deg`, or `roll_deg,pitch_deg,yaw_deg`, or `qw,qx,qy,qz`.
     #[key(example = "\"poses.csv\"")]

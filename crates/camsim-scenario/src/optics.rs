@@ -55,10 +55,10 @@ pub struct ChromaticSpec {
     #[key(step = 0.0001, example = "[0.9995]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub blue_scale: Vec<f64>,
-    /// Red's own lens, in place of `red_scale`.
+    /// Red's own lens, instead of `red_scale`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub red: Option<PrimaryLensSpec>,
-    /// Blue's own lens, in place of `blue_scale`.
+    /// Blue's own lens, instead of `blue_scale`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blue: Option<PrimaryLensSpec>,
 }
@@ -133,7 +133,7 @@ pub struct ImageCircleSpec {
     #[key(unit = "px", step = 0.5, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_px: Option<[f64; 2]>,
-    /// Largest angle of a ray to the optical axis, in place of `radius_px` or beside it. Left out: no limit.
+    /// Largest angle of a ray to the optical axis, instead of `radius_px` or beside it. Left out: no limit.
     #[key(
         unit = "deg",
         step = 0.5,
@@ -158,11 +158,11 @@ pub struct VignettingSpec {
     #[key(step = 0.005, example = "[-0.3, 0.1, 0.0]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub polynomial: Vec<f64>,
-    /// Polynomial of red, in place of `polynomial`. Left out: that of all.
+    /// Polynomial of red, instead of `polynomial`. Left out: that of all.
     #[key(step = 0.005, example = "[-0.32]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomial_red: Option<Vec<f64>>,
-    /// Polynomial of blue, in place of `polynomial`. Left out: that of all.
+    /// Polynomial of blue, instead of `polynomial`. Left out: that of all.
     #[key(step = 0.005, example = "[-0.28]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomial_blue: Option<Vec<f64>>,

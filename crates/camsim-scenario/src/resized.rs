@@ -25,11 +25,11 @@ pub struct ResizedSpec {
     #[key(step = 0.05, min = 1, max = MAX_SIDE_PX, hint = "2 makes one of 2 x 2", example = "2")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub binning: Option<Binning>,
-    /// Factor on width and height, which are rounded, in place of `binning`. Left out: no change.
+    /// Factor on width and height, which are rounded, instead of `binning`. Left out: no change.
     #[key(step = 0.005, above = 0.0, max = MAX_SIDE_PX, hint = "0.5 halves both", example = "0.5")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// Width and height of the delivered picture, in place of `binning` and `scale`. Left out: by these.
+    /// Width and height of the delivered picture, instead of `binning` and `scale`. Left out: by these.
     #[key(
         unit = "px",
         min = 1,

@@ -25,7 +25,7 @@ pub struct SceneSpec {
     /// A calibration board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardSpec>,
-    /// Models (glTF), each at one place or at those of a placement table.
+    /// Models (glTF), each at one position or at those of a placement table.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gltf: Vec<GltfSpec>,
     /// Colour of the sky.
@@ -219,7 +219,7 @@ pub struct PatternSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct BoardSpec {
-    /// Target file (YAML) of Kalibr, in place of `kind`, `columns`, `rows` and `size_m`.
+    /// Target file (YAML) of Kalibr, instead of `kind`, `columns`, `rows` and `size_m`.
     #[key(example = "\"target.yaml\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<PathBuf>,
@@ -276,7 +276,7 @@ pub struct BoardSpec {
     /// Position of the centre: `"origin"` or north, east, down.
     #[key(unit = "m", step = 0.1, names = "N E D")]
     pub at: PatternCentre,
-    /// Geodetic position of the centre, in place of `at`: latitude, longitude and height. The height is in
+    /// Geodetic position of the centre, instead of `at`: latitude, longitude and height. The height is in
     /// the datum of `flight.height`.
     #[key(unit = "deg, deg, m", step = 0.1, example = "[46.75, 9.83, 1860.0]", names = "lat lon h")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -305,12 +305,12 @@ pub struct GltfSpec {
     /// Position of the model's origin: `"origin"` or north, east, down.
     #[key(unit = "m", step = 0.1, names = "N E D")]
     pub at: PatternCentre,
-    /// Geodetic position of the model's origin, in place of `at`: latitude, longitude and height. The height
+    /// Geodetic position of the model's origin, instead of `at`: latitude, longitude and height. The height
     /// is in the datum of `flight.height`.
     #[key(unit = "deg, deg, m", step = 0.1, example = "[46.75, 9.83, 1860.0]", names = "lat lon h")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub geodetic: Option<[f64; 3]>,
-    /// CSV table of placements, in place of `at`. Its columns are `n_m,e_m,d_m` or
+    /// CSV table of placements, instead of `at`. Its columns are `n_m,e_m,d_m` or
     /// `lat_deg,lon_deg,height_m`, and optionally `heading_deg` and `scale`.
     #[key(example = "\"placements.csv\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -348,7 +348,7 @@ pub struct GltfSpec {
     /// What an object is: each copy, or its nodes or materials.
     #[serde(skip_serializing_if = "crate::is_default")]
     pub objects: ObjectsOf,
-    /// Classes by name of node (with all below it) or of material, in place of `class`.
+    /// Classes by name of node (with all below it) or of material, instead of `class`.
     #[key(min = 1, max = u16::MAX, hint = "leave it out for no class", example = "{ roof = 4 }")]
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub classes: BTreeMap<String, u16>,

@@ -30,7 +30,7 @@ pub enum SensorAxes {
     Rdf,
 }
 
-/// Place and orientation of a sensor on the platform.
+/// Position and orientation of a sensor on the platform.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorMountSpec {
@@ -124,7 +124,7 @@ pub struct BarometerSpec {
     /// Samples per second.
     #[key(default = 50.0, unit = "Hz", above = 0.0, max = MAX_RATE_HZ, hint = "give samples a second")]
     pub rate_hz: f64,
-    /// Place in body axes: forward, right, down.
+    /// Position in body axes: forward, right, down.
     #[key(unit = "m", step = 0.01, names = "fwd right down")]
     pub offset_m: [f64; 3],
     /// Pressure at mean sea level. All pressures are those of the standard atmosphere times this over
@@ -177,7 +177,7 @@ pub struct MagnetometerSpec {
     /// Samples per second.
     #[key(default = 50.0, unit = "Hz", above = 0.0, max = MAX_RATE_HZ, hint = "give samples a second")]
     pub rate_hz: f64,
-    /// Place and orientation on the platform.
+    /// Position and orientation on the platform.
     pub mount: SensorMountSpec,
     /// Axes of the output at the mount's angles 0.
     pub axes: SensorAxes,
@@ -185,7 +185,7 @@ pub struct MagnetometerSpec {
     #[key(unit = "uT", step = 0.1, example = "[21.6, 1.4, 43.1]", names = "N E D")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field_ned_ut: Option<[f64; 3]>,
-    /// Day (`YYYY-MM-DD`) of the field of the World Magnetic Model, in place of `field_ned_ut`.
+    /// Day (`YYYY-MM-DD`) of the field of the World Magnetic Model, instead of `field_ned_ut`.
     #[key(example = "\"2026-11-27\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub date: Option<String>,

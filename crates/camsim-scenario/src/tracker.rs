@@ -26,8 +26,8 @@ pub struct TrackerSpec {
     /// Limit of the angular rate about the body's axes. `auto`: as of `max_speed_m_s`.
     #[key(unit = "deg/s", step = 0.1, above = 0.0, hint = "or write \"auto\"")]
     pub max_angular_rate_deg_s: Auto<f64>,
-    /// Limit of the angular acceleration. `auto`: as of `max_acceleration_m_s2`, with 60 (the paper's) in
-    /// place of 19.6.
+    /// Limit of the angular acceleration. `auto`: as of `max_acceleration_m_s2`, with 60 (the paper's) instead
+    /// of 19.6.
     #[key(unit = "deg/s2", step = 0.5, above = 0.0, hint = "or write \"auto\"")]
     pub max_angular_acceleration_deg_s2: Auto<f64>,
 }

@@ -19,7 +19,7 @@ pub struct HeadlessFrame {
 /// Renders a frame in full size on the threads that serve the window.
 ///
 /// # Errors
-/// Whatever the window would report in place of the picture.
+/// Whatever the window would report instead of the picture.
 pub fn render_headless(scenario: &Path, frame: u64) -> anyhow::Result<HeadlessFrame> {
     let scenario = Arc::new(read_scenario(scenario, &[], None)?);
     let (wake, woken) = std::sync::mpsc::channel();

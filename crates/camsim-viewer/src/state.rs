@@ -22,7 +22,7 @@ use crate::{
 
 pub(crate) mod dropped_files;
 
-/// Time without input after which full frames are rendered in place of previews, seconds.
+/// Time without input after which full frames are rendered instead of previews, seconds.
 pub const IDLE_S: f64 = 0.2;
 /// Render time of a full frame above which play shows previews, ms.
 const PREVIEW_ABOVE_MS: f64 = 60.0;

@@ -46,7 +46,7 @@ pub struct Overlays {
     pub rows: bool,
     /// Predicted source error in colours.
     pub error: bool,
-    /// Depth in place of colour.
+    /// Depth instead of colour.
     pub depth: bool,
 }
 
@@ -109,7 +109,7 @@ pub struct View {
     pub overlays: Overlays,
     /// Page of the right panel.
     pub tab: Tab,
-    /// Whether plots show tracking errors in place of log and tracker.
+    /// Whether plots show tracking errors instead of log and tracker.
     pub plot_errors: bool,
     /// Viewpoint of the 3D page.
     pub orbit: Orbit,

@@ -60,7 +60,7 @@ FRAME.toml (paths relative to it):
                                if y is up
   [fog]                        end_m, color: with --preset paper only
 
-Several frames, in place of color, depth and stamp_s:
+Several frames, instead of color, depth and stamp_s:
   color = \"rgb/*.png\", depth = \"depth/*.png\"   paired by the text of the *; with name_unit = \"s\" | \"ms\" | \"us\" | \"ns\" it is a time,
                                paired with the nearest within max_gap_ms = 20
   color = \"rgb.txt\", depth = \"depth.txt\"       lists of `time file`

@@ -46,7 +46,7 @@ pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         .board
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("yaml") || ending.eq_ignore_ascii_case("yml"));
-    let (board, place) = if yaml {
+    let (board, pose) = if yaml {
         (
             read_board(&BoardSpec { target: Some(args.board.clone()), ..BoardSpec::default() })
                 .or_bad_input()?,
@@ -70,10 +70,10 @@ pub fn run(args: &BoardArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     write_output(args.points.as_deref(), console, |out| {
-        writeln!(out, "id,x_m,y_m{}", if place.is_some() { ",n_m,e_m,d_m" } else { "" })?;
+        writeln!(out, "id,x_m,y_m{}", if pose.is_some() { ",n_m,e_m,d_m" } else { "" })?;
         for point in board.points() {
             write!(out, "{},{:?},{:?}", point.id, point.position_m.x, point.position_m.y)?;
-            if let Some((centre_ned_m, turn)) = place {
+            if let Some((centre_ned_m, turn)) = pose {
                 let ned = centre_ned_m + turn * point.position_m.extend(0.0);
                 write!(out, ",{:?},{:?},{:?}", ned.x, ned.y, ned.z)?;
             }

@@ -98,7 +98,7 @@ enum BodyArg {
 
 /// Write cameras in the format of another program
 ///
-/// Reads a CAMERA.toml, a file with [[cameras]], a scenario or a run.json. What the format has no place for is
+/// Reads a CAMERA.toml, a file with [[cameras]], a scenario or a run.json. What the format cannot hold is
 /// named in a note; a lens that it does not have is an error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

@@ -116,7 +116,7 @@ fn render_source(args: &ExportArgs, console: &mut Console<'_>) -> Result<PathBuf
     Ok(folder)
 }
 
-/// A scenario with what its datasets need, or in place of them `export`; says what was added.
+/// A scenario with what its datasets need, or instead of them `export`; says what was added.
 pub fn with_needs(
     mut scenario: Scenario,
     export: Option<DatasetFormat>,
@@ -140,7 +140,7 @@ pub fn with_needs(
     }
 }
 
-/// Refuses lenses that a dataset, or in place of them `export`, has no place for.
+/// Refuses lenses that a dataset, or instead of them `export`, cannot hold.
 pub fn judge_lenses<'a>(
     mut scenarios: impl Iterator<Item = &'a Scenario>,
     export: Option<DatasetFormat>,
@@ -182,8 +182,8 @@ fn export_run(
     console: &mut Console<'_>,
 ) -> Result<String, Failure> {
     if !run.is_finished {
-        let place = run.path.display();
-        console.warn(format_args!("{place} is not finished: the frames that it has are exported"));
+        let path = run.path.display();
+        console.warn(format_args!("{path} is not finished: the frames that it has are exported"));
     }
     if !run.empty.is_empty() {
         console.warn(format_args!(
@@ -208,6 +208,6 @@ fn export_run(
     };
     report.notes.iter().for_each(|note| console.note(note));
     let state = if report.was_complete { "was complete" } else { "written" };
-    let (frames, place) = (report.pictures, quoted(folder));
-    Ok(format!("{} of {frames} pictures {state}: {place}", format.name()))
+    let (frames, path) = (report.pictures, quoted(folder));
+    Ok(format!("{} of {frames} pictures {state}: {path}", format.name()))
 }

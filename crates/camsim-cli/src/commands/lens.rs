@@ -328,8 +328,8 @@ fn header<const N: usize>(row: &csv::StringRecord, columns: [&str; N]) -> Option
         row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
     };
     let mut indices = [0; N];
-    for (place, name) in indices.iter_mut().zip(columns) {
-        *place = index(name)?;
+    for (slot, name) in indices.iter_mut().zip(columns) {
+        *slot = index(name)?;
     }
     Some(indices)
 }

@@ -75,10 +75,10 @@ pub struct RenderArgs {
     /// Renderer [default: gpu on a graphics card, cpu elsewhere, reference if quality.solver is "oracle"]
     #[arg(long, value_enum)]
     backend: Option<RenderBackend>,
-    /// Channels, in place of output.channels
+    /// Channels, instead of output.channels
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = channel_parser())]
     outputs: Option<Vec<Channel>>,
-    /// File formats, in place of output.format; none renders and reads back without writing frames (for
+    /// File formats, instead of output.format; none renders and reads back without writing frames (for
     /// timing)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     format: Option<Vec<FormatArg>>,
@@ -247,7 +247,7 @@ fn with_backend(scenario: Scenario, backend: Option<RenderBackend>) -> Result<Sc
     }
 }
 
-/// `--outputs` and `--format` in place of `[output]`.
+/// `--outputs` and `--format` instead of `[output]`.
 fn with_outputs(mut scenario: Scenario, args: &RenderArgs) -> Result<Scenario, Failure> {
     if let Some(channels) = &args.outputs {
         scenario.output.channels = without_repeats(channels);

@@ -199,7 +199,7 @@ fn seen_s(cameras: &[(&Sequence, Option<[u64; 2]>)]) -> Result<Option<[f64; 2]>,
 fn table_kind(pictures: &Pictures) -> TableKind {
     let sequence = &pictures.sequence;
     TableKind {
-        has_places: pictures.earth.is_some(),
+        has_geodetic: pictures.earth.is_some(),
         has_exposures: sequence.exposures.is_some(),
         has_instants: pictures.has_instants(),
     }
@@ -263,7 +263,7 @@ fn record(
         instant: files.instant(),
         stamp_ns: sequence.stamp_ns(frame),
         pose,
-        place: pictures.earth.map(|earth| earth.geodetic_from_ned(pose.position_ned_m)),
+        geodetic: pictures.earth.map(|earth| earth.geodetic_from_ned(pose.position_ned_m)),
         source,
         exposure: sequence.exposure(frame),
         files: files.names(frame),

@@ -1,4 +1,4 @@
-//! Input that is refused, with place and remedy.
+//! Input that is refused, with location and remedy.
 
 use std::fs;
 
@@ -26,7 +26,7 @@ fn other_files_are_refused_as_scenario() {
 }
 
 #[test]
-fn invalid_input_is_refused_with_place_and_remedy() {
+fn invalid_input_is_refused_with_position_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, content: &str| {
         let path = folder.path().join(name);

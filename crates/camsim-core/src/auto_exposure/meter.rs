@@ -23,7 +23,7 @@ use crate::{
 /// Points of the grid.
 const COLUMNS: usize = 24;
 const ROWS: usize = 18;
-/// Texture is read at so many places along each side of a cell's parallelogram.
+/// Texture is read at so many positions along each side of a cell's parallelogram.
 const READS: u32 = 4;
 /// Least cosine between the normals of neighbouring points on one face of a mesh.
 const SAME_FACE: f64 = 0.99;
@@ -68,17 +68,17 @@ struct MeterPoint {
     vignette: f64,
 }
 
-/// Light of a picture: luminances at places that have a ray, and their weights.
+/// Light of a picture: luminances at positions that have a ray, and their weights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MeteredLight {
-    places: Vec<[f32; 2]>,
+    samples: Vec<[f32; 2]>,
 }
 
 impl MeteredLight {
-    /// Mean of `min(gain * light, most)`; 0 where no place has a ray.
+    /// Mean of `min(gain * light, most)`; 0 where no position has a ray.
     pub fn level(&self, gain: f64, most: f64) -> f64 {
         let (mut sum, mut weights) = (0.0, 0.0);
-        for [light, weight] in self.places.iter().map(|place| place.map(f64::from)) {
+        for [light, weight] in self.samples.iter().map(|sample| sample.map(f64::from)) {
             sum += weight * (gain * light).min(most);
             weights += weight;
         }
@@ -89,7 +89,7 @@ impl MeteredLight {
         let light = point.vignette * DVec3::from_array(LUMINANCE_F64).dot(color);
         // What is no number is dark.
         let light = if light.is_finite() { light.max(0.0) } else { 0.0 };
-        self.places.push([light, point.weight * fraction].map(|value| value as f32));
+        self.samples.push([light, point.weight * fraction].map(|value| value as f32));
     }
 }
 
@@ -162,10 +162,10 @@ impl Meter {
         let Some((hit, sides)) = sides else {
             return light.add(self.oracle.light_of(here.hit.as_ref()), point, 1.0);
         };
-        let place = |k: u32| (f64::from(k) + 0.5) / f64::from(READS) - 0.5;
+        let position = |k: u32| (f64::from(k) + 0.5) / f64::from(READS) - 0.5;
         for j in 0..READS {
             for k in 0..READS {
-                let uv = DVec2::from_array(hit.texture_uv) + sides * DVec2::new(place(k), place(j));
+                let uv = DVec2::from_array(hit.texture_uv) + sides * DVec2::new(position(k), position(j));
                 let hit = Hit { texture_uv: uv.to_array(), ..hit };
                 light.add(self.oracle.light_of(Some(&hit)), point, 1.0 / f64::from(READS * READS));
             }
@@ -183,9 +183,9 @@ impl Meter {
             let uv = DVec2::from_array(other.texture_uv) - DVec2::from_array(hit.texture_uv);
             is_near.then(|| (uv, self.points[k].position_px - self.points[i].position_px))
         };
-        let after = |step: usize, place: usize, count: usize| {
-            let next = (place + 1 < count).then(|| way(i + step)).flatten();
-            next.or_else(|| (place > 0).then(|| way(i - step)).flatten())
+        let after = |step: usize, index: usize, count: usize| {
+            let next = (index + 1 < count).then(|| way(i + step)).flatten();
+            next.or_else(|| (index > 0).then(|| way(i - step)).flatten())
         };
         let ((uv_along, px_along), (uv_down, px_down)) =
             after(1, column, COLUMNS).zip(after(COLUMNS, row, ROWS))?;
@@ -195,7 +195,7 @@ impl Meter {
     }
 }
 
-/// Places of the points of neighbouring cells within them, -0.5 to 0.5: multiples of the golden ratio's fraction.
+/// Positions of the points of neighbouring cells within them, -0.5 to 0.5: multiples of the golden ratio's fraction.
 fn spread(k: usize) -> f64 {
     (k as f64 * 0.618_033_988_749_894_9 + 0.5).fract() - 0.5
 }

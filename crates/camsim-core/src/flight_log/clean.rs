@@ -243,7 +243,7 @@ fn mark_attitudes(rows: &mut [CleanRow], report: &mut CleaningReport) {
     }
 }
 
-/// Refuses rows of one time at several places: their mean would stand still where nothing was.
+/// Refuses rows of one time at several positions: their mean would stand still where nothing was.
 fn check_clock(rows: &[CleanRow]) -> Result<(), LogError> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
     let distance_m =

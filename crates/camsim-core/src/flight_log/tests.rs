@@ -111,7 +111,7 @@ fn spikes_of_several_rows_and_at_the_ends_are_dropped() {
         rows[i].position = RawPosition::Ned(DVec3::new(0.0, 60.0, -100.0));
     }
     assert_eq!(log(&rows).report.position_spikes.lines, [1, 51, 52, 100]);
-    // Every repaired row has its place on the timeline, however many there are.
+    // Every repaired row has its position on the timeline, however many there are.
     let mut many = straight(400);
     (100..200).for_each(|at| many[at].attitude = RawAttitude::EulerDeg([f64::NAN, 0.0, 0.0]));
     let report = log(&many).report;
@@ -293,7 +293,7 @@ fn null_fixes_are_dropped_and_true_zeros_are_kept() {
     let ghana: Vec<_> =
         (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.1 - 0.01 * i as f64, 0.0, 3.0 * i as f64)).collect();
     assert!(log(&ghana).report.is_clean(), "{}", log(&ghana).report);
-    // A fix at 0, 0 throughout is a made-up place, and a log of its own.
+    // A fix at 0, 0 throughout is a made-up position, and a log of its own.
     let nowhere: Vec<_> = (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.0, 0.0, 100.0)).collect();
     assert!(log(&nowhere).report.is_clean());
 }
@@ -316,8 +316,8 @@ fn track_circle(rate_rad_s: f64) -> FlightLog {
         .map(|i| {
             let t_s = f64::from(i) * 0.05;
             let (sin, cos) = (rate_rad_s * t_s).sin_cos();
-            let place = [100.0 * sin, 100.0 * (1.0 - cos), -100.0];
-            RawRow { attitude: RawAttitude::None, ..ned_row(1 + i as usize, t_s, place, [0.0; 3]) }
+            let position = [100.0 * sin, 100.0 * (1.0 - cos), -100.0];
+            RawRow { attitude: RawAttitude::None, ..ned_row(1 + i as usize, t_s, position, [0.0; 3]) }
         })
         .collect();
     FlightLog::from_raw(&rows, &by_track()).unwrap()

@@ -81,12 +81,12 @@ impl Mosaicked {
         let Candidates { cross, diagonal, beside, above } = candidates;
         for phase in 0..2 {
             let color = |x: usize, y: usize| color_at(self.mosaic, [x as u32, y as u32]);
-            let places = (phase..self.width).step_by(2);
+            let columns = (phase..self.width).step_by(2);
             match (color(phase, y), color(phase + 1, y)) {
-                (RED, _) => places.for_each(|x| out[x] = [own[x], cross[x], diagonal[x]]),
-                (BLUE, _) => places.for_each(|x| out[x] = [diagonal[x], cross[x], own[x]]),
-                (_, RED) => places.for_each(|x| out[x] = [beside[x], own[x], above[x]]),
-                _ => places.for_each(|x| out[x] = [above[x], own[x], beside[x]]),
+                (RED, _) => columns.for_each(|x| out[x] = [own[x], cross[x], diagonal[x]]),
+                (BLUE, _) => columns.for_each(|x| out[x] = [diagonal[x], cross[x], own[x]]),
+                (_, RED) => columns.for_each(|x| out[x] = [beside[x], own[x], above[x]]),
+                _ => columns.for_each(|x| out[x] = [above[x], own[x], beside[x]]),
             }
         }
     }
@@ -126,14 +126,14 @@ impl Mosaicked {
     }
 }
 
-/// Place of a pixel or, beyond the ends, of its mirror image about the outermost pixel, which has the same colour
+/// Position of a pixel or, beyond the ends, of its mirror image about the outermost pixel, which has the same colour
 /// in a mosaic of two by two.
-fn mirrored(place: i64, count: usize) -> usize {
+fn mirrored(index: i64, count: usize) -> usize {
     let last = count as i64 - 1;
     if last == 0 {
         return 0;
     }
-    let folded = place.rem_euclid(2 * last);
+    let folded = index.rem_euclid(2 * last);
     folded.min(2 * last - folded) as usize
 }
 

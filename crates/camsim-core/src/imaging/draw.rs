@@ -29,9 +29,9 @@ pub struct Draws {
 /// The low 8 bits of `pcg4d` have a pattern; the high ones of two further words replace them.
 #[must_use]
 #[inline(always)]
-pub fn two_words(place: u32, frame: u32, seed: u64, stream: u32) -> [u32; 2] {
+pub fn two_words(pixel: u32, frame: u32, seed: u64, stream: u32) -> [u32; 2] {
     let stream = stream.wrapping_mul(0x9e37_79b9);
-    let [a, b, c, d] = pcg4d([place, frame, seed as u32, (seed >> 32) as u32 ^ stream]);
+    let [a, b, c, d] = pcg4d([pixel, frame, seed as u32, (seed >> 32) as u32 ^ stream]);
     [(a & !0xff) | (c >> 24), (b & !0xff) | (d >> 24)]
 }
 

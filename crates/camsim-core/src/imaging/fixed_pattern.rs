@@ -10,7 +10,7 @@ use super::{
     stream,
 };
 
-/// Number in place of a frame's.
+/// Number instead of a frame's.
 const EVERY_FRAME: u32 = 0;
 
 /// Fixed pattern of a sensor. Indices count the channels of a pixel, then pixels row by row.
@@ -68,14 +68,14 @@ impl FixedPattern {
 
     /// Hot pixels of a range, with their dark current relative to the mean.
     pub fn hot_in(&self, range: Range<usize>) -> &[(u32, f32)] {
-        let place = |index: usize| self.hot.partition_point(|(i, _)| (*i as usize) < index);
-        &self.hot[place(range.start)..place(range.end)]
+        let rank = |index: usize| self.hot.partition_point(|(i, _)| (*i as usize) < index);
+        &self.hot[rank(range.start)..rank(range.end)]
     }
 
     /// Dead pixels of a range.
     pub fn dead_in(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
-        let place = |index: usize| self.dead.partition_point(|i| (*i as usize) < index);
-        self.dead[place(range.start)..place(range.end)].iter().map(|i| *i as usize)
+        let rank = |index: usize| self.dead.partition_point(|i| (*i as usize) < index);
+        self.dead[rank(range.start)..rank(range.end)].iter().map(|i| *i as usize)
     }
 }
 

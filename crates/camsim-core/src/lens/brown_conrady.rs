@@ -248,7 +248,7 @@ impl PlaneFormula for Formula {
     }
 
     #[inline(always)]
-    fn place(&self, ray: DVec3) -> DVec2 {
+    fn position(&self, ray: DVec3) -> DVec2 {
         ray.truncate() / ray.z
     }
 

@@ -77,11 +77,11 @@ fn tilt(tau_x: f64, tau_y: f64) -> DMat3 {
 
 impl DirectionFormula for Prism {
     fn image(&self, ray: DVec3) -> DVec2 {
-        self.value_and_jacobian(self.place(ray)).0
+        self.value_and_jacobian(self.position(ray)).0
     }
 
     fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
-        gradient_of_plane(self.value_and_jacobian(self.place(ray)).1, ray)
+        gradient_of_plane(self.value_and_jacobian(self.position(ray)).1, ray)
     }
 
     fn margin(&self, ray: DVec3) -> f64 {
@@ -111,7 +111,7 @@ impl PlaneFormula for Prism {
     }
 
     #[inline(always)]
-    fn place(&self, ray: DVec3) -> DVec2 {
+    fn position(&self, ray: DVec3) -> DVec2 {
         ray.truncate() / ray.z
     }
 

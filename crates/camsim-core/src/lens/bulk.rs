@@ -140,7 +140,7 @@ fn inside_of(lens: &BrownConrady) -> f64 {
 /// Radius of the formula's plane within which every point is on the principal branch.
 fn inside(lens: &DirectionLens, formula: &dyn PlaneFormula) -> f64 {
     let (sin, cos) = (SURELY_INSIDE * lens.smallest_angle()).sin_cos();
-    formula.place(DVec2::new(sin, 0.0).extend(cos)).length()
+    formula.position(DVec2::new(sin, 0.0).extend(cos)).length()
 }
 
 /// Solves points as they are before the image is scaled.

@@ -41,7 +41,7 @@ impl Mei {
 
 impl DirectionFormula for Mei {
     fn image(&self, ray: DVec3) -> DVec2 {
-        self.formula.distort(self.place(ray))
+        self.formula.distort(self.position(ray))
     }
 
     fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
@@ -72,7 +72,7 @@ impl PlaneFormula for Mei {
         self.formula.value_and_jacobian(at)
     }
 
-    fn place(&self, ray: DVec3) -> DVec2 {
+    fn position(&self, ray: DVec3) -> DVec2 {
         ray.truncate() / self.below(ray)
     }
 

@@ -108,14 +108,14 @@ impl LensGrid {
     }
 
     /// The ray in the table's chart; `None` for one that the chart lacks.
-    fn place(&self, ray: DVec3) -> Option<DVec2> {
+    fn position(&self, ray: DVec3) -> Option<DVec2> {
         match self.chart {
             RayChart::Ideal => (ray.z > 0.0).then(|| ray.truncate() / ray.z),
             RayChart::Angles => Some(angles_of(ray)),
         }
     }
 
-    /// `d place / d (x, y, z)`, then a linear map.
+    /// `d position / d (x, y, z)`, then a linear map.
     fn gradient(&self, ray: DVec3, then: DMat2) -> [DVec2; 3] {
         match self.chart {
             RayChart::Ideal => gradient_of_plane(then, ray),
@@ -142,21 +142,21 @@ struct OfRays(Arc<LensGrid>);
 
 impl DirectionFormula for OfRays {
     fn image(&self, ray: DVec3) -> DVec2 {
-        match self.0.place(ray) {
+        match self.0.position(ray) {
             Some(at) if self.0.holds(at) => self.0.spline.at(at).0,
             _ => DVec2::NAN,
         }
     }
 
     fn gradient(&self, ray: DVec3) -> [DVec2; 3] {
-        match self.0.place(ray) {
+        match self.0.position(ray) {
             Some(at) if self.0.holds(at) => self.0.gradient(ray, self.0.spline.at(at).1),
             _ => [DVec2::NAN; 3],
         }
     }
 
     fn margin(&self, ray: DVec3) -> f64 {
-        self.0.place(ray).map_or(-1.0, |at| self.0.spline.inside(at) + ON_BORDER)
+        self.0.position(ray).map_or(-1.0, |at| self.0.spline.inside(at) + ON_BORDER)
     }
 
     fn angle_max(&self) -> f64 {
@@ -193,7 +193,7 @@ impl ChartMap for Points<'_> {
 
 impl OfPoints {
     fn solve(&self, ray: DVec3) -> Option<DVec2> {
-        self.branch.solve(&Points(&self.grid), self.grid.place(ray)?)
+        self.branch.solve(&Points(&self.grid), self.grid.position(ray)?)
     }
 }
 
@@ -227,8 +227,8 @@ impl ClosedInverse for OfPoints {
         let sides = rim.iter().zip(rim.iter().cycle().skip(1));
         let crossing = sides.filter_map(|(a, b)| {
             let (from, to) = (axis.perp_dot(*a), axis.perp_dot(*b));
-            let place = a.lerp(*b, from / (from - to)).dot(axis);
-            (from * to <= 0.0 && from != to && place > 0.0).then_some(place)
+            let position = a.lerp(*b, from / (from - to)).dot(axis);
+            (from * to <= 0.0 && from != to && position > 0.0).then_some(position)
         });
         let radius = crossing.fold(f64::INFINITY, f64::min);
         let is_plane = self.grid.chart == RayChart::Ideal;

@@ -23,7 +23,7 @@ pub(super) struct Region {
     is_transposed: bool,
 }
 
-/// Place of the edge in row y: `middle + slope t + bend t^2` with t counted from the middle row.
+/// Position of the edge in row y: `middle + slope t + bend t^2` with t counted from the middle row.
 pub(super) struct Curve {
     pub middle: f64,
     pub slope: f64,
@@ -84,11 +84,11 @@ impl Region {
         let middle_row = 0.5 * (self.height as f64 - 1.0);
         let mut curve = Curve { middle: 0.5 * (self.width as f64 - 1.0), slope: 0.0, bend: 0.0, middle_row };
         for _ in 0..PASSES {
-            let places: Vec<f64> = (0..self.height)
+            let positions: Vec<f64> = (0..self.height)
                 .map(|y| centroid(self.row(y), curve.at(y)))
                 .collect::<Option<_>>()
                 .ok_or(EdgeError::Flat)?;
-            curve = parabola(&places, middle_row).ok_or(EdgeError::Flat)?;
+            curve = parabola(&positions, middle_row).ok_or(EdgeError::Flat)?;
         }
         if curve.slope.abs() * (self.height as f64) < LEAST_CROSSED {
             return Err(EdgeError::Parallel(curve.slope.abs().atan().to_degrees()));
@@ -129,7 +129,7 @@ impl Region {
     }
 }
 
-/// Centroid of a row's derivative, in a window about a place.
+/// Centroid of a row's derivative, in a window about a position.
 fn centroid(row: &[f64], about: f64) -> Option<f64> {
     let half = about.min(row.len() as f64 - 1.0 - about);
     let (mut sum, mut moment) = (0.0, 0.0);
@@ -143,19 +143,19 @@ fn centroid(row: &[f64], about: f64) -> Option<f64> {
             moment += slope * (x - about);
         }
     }
-    let place = about + moment / sum;
-    place.is_finite().then_some(place)
+    let position = about + moment / sum;
+    position.is_finite().then_some(position)
 }
 
 /// Least squares.
-fn parabola(places: &[f64], middle_row: f64) -> Option<Curve> {
+fn parabola(positions: &[f64], middle_row: f64) -> Option<Curve> {
     let scale = middle_row.max(1.0);
     let (mut normal, mut right) = (DMat3::ZERO, DVec3::ZERO);
-    for (row, place) in places.iter().enumerate() {
+    for (row, position) in positions.iter().enumerate() {
         let t = (row as f64 - middle_row) / scale;
         let terms = DVec3::new(1.0, t, t * t);
         normal += DMat3::from_cols(terms.x * terms, terms.y * terms, terms.z * terms);
-        right += *place * terms;
+        right += *position * terms;
     }
     let fit = normal.inverse() * right;
     fit.is_finite().then(|| Curve {

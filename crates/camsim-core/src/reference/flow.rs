@@ -1,7 +1,7 @@
 //! Flow, motion and blur path of the oracle: where another picture shows what a pixel sees, by a search over
 //! the instants of that picture's rows.
 //!
-//! The equation `place = project(camera(t(place)), point(t(place)))` along the readout is looked at in steps of
+//! The equation `position = project(camera(t(position)), point(t(position)))` along the readout is looked at in steps of
 //! half a pixel, from border to border. Each change of sign is closed in on by bisection, and each turn near zero by
 //! thirds, as two solutions may be beside it.
 
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Step along the readout, pixels: the centres of rows, where the speed of the readout may change, are among the
-/// places.
+/// positions.
 const STEP_PX: f64 = 0.5;
 /// Halvings of an interval of one step.
 const BISECTIONS: u32 = 36;
@@ -27,8 +27,8 @@ const STEP_S: f64 = 1e-4;
 /// What a pixel sees.
 #[derive(Clone, Copy, Debug)]
 enum Goal<'a> {
-    /// A place, and the motion of what it is on, with where it was at path time 0.
-    Place(DVec3, Option<&'a RigidMotion>),
+    /// A point, and the motion of what it is on, with where it was at path time 0.
+    Point(DVec3, Option<&'a RigidMotion>),
     /// A direction of the sky.
     Sky(DVec3),
 }
@@ -49,18 +49,18 @@ pub(super) struct FlowPicture<'a> {
 struct FieldScan {
     /// An image row of the field.
     row: u32,
-    places: Vec<(f64, f64, CameraPose)>,
+    samples: Vec<(f64, f64, CameraPose)>,
 }
 
 /// Where a picture shows a goal.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct Sighting {
     px: DVec2,
     t_s: f64,
     pose: CameraPose,
 }
 
-/// A place along the readout, pixels, and what its camera misses it by.
+/// A position along the readout, pixels, and what its camera misses it by.
 type Miss = (f64, Option<f64>);
 
 fn changes_sign(a: Miss, b: Miss) -> bool {
@@ -77,12 +77,15 @@ impl Oracle {
             // Half a row of the field beyond its ends, within the picture.
             let low_px = (first - 0.5 * step).max(-0.5);
             let high_px = (last + 0.5 * step).min(f64::from(self.timing.lines()) - 0.5);
-            let place = |k: u32| {
+            let sample = |k: u32| {
                 let along_px = (low_px + STEP_PX * f64::from(k)).min(high_px);
                 let t_s = stamp_s + self.timing.dt_along_s(along_px, row);
                 (along_px, t_s, self.sequence.path.pose(t_s))
             };
-            FieldScan { row, places: (0..=((high_px - low_px) / STEP_PX).ceil() as u32).map(place).collect() }
+            FieldScan {
+                row,
+                samples: (0..=((high_px - low_px) / STEP_PX).ceil() as u32).map(sample).collect(),
+            }
         };
         FlowPicture {
             oracle: self,
@@ -127,7 +130,7 @@ impl Oracle {
             let state = motion.state(seen.t_s);
             state.rotation.conjugate() * (hit.point_ned_m - state.shift_m)
         });
-        Goal::Place(at_start, motion)
+        Goal::Point(at_start, motion)
     }
 }
 
@@ -136,8 +139,8 @@ impl Goal<'_> {
     fn way_from(&self, pose: &CameraPose, t_s: f64) -> DVec3 {
         match self {
             Self::Sky(direction) => *direction,
-            Self::Place(point, None) => *point - pose.position_ned_m,
-            Self::Place(at_start, Some(motion)) => {
+            Self::Point(point, None) => *point - pose.position_ned_m,
+            Self::Point(at_start, Some(motion)) => {
                 let state = motion.state(t_s);
                 state.rotation * *at_start + state.shift_m - pose.position_ned_m
             }
@@ -162,27 +165,28 @@ impl FlowPicture<'_> {
     /// Displacement of what a pixel sees, pixels, and state: the channels `flow`, `flow_back` and `flow_global`.
     pub(super) fn flow(&self, from_px: DVec2, seen: &RaySample) -> (DVec2, FlowState) {
         let goal = self.oracle.goal(seen);
-        let mut places = self.places(goal);
-        places.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
-        let Some(nearest) = places.first() else {
+        let mut sightings = self.sightings(goal);
+        sightings.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+        let Some(nearest) = sightings.first() else {
             return self
                 .outside(goal, from_px)
                 .map_or((DVec2::ZERO, FlowState::None), |px| (px - from_px, FlowState::Outside));
         };
-        let shown: Vec<&Place> = places.iter().filter(|place| !self.is_hidden(goal, place)).collect();
-        let (place, state) = match shown.as_slice() {
+        let shown: Vec<&Sighting> =
+            sightings.iter().filter(|sighting| !self.is_hidden(goal, sighting)).collect();
+        let (sighting, state) = match shown.as_slice() {
             [] => (nearest, FlowState::Occluded),
             [only] => (*only, FlowState::Visible),
             [nearest, ..] => (*nearest, FlowState::Several),
         };
-        (place.px - from_px, state)
+        (sighting.px - from_px, state)
     }
 
-    /// Whether something is in front of a goal at one of its places.
-    fn is_hidden(&self, goal: Goal<'_>, place: &Place) -> bool {
-        let way = goal.way_from(&place.pose, place.t_s);
-        let hit = self.oracle.cast_at(place.t_s, place.pose.position_ned_m, way);
-        // The parameter is 1 at the place; the sky is infinitely far away.
+    /// Whether something is in front of a goal where the picture shows it.
+    fn is_hidden(&self, goal: Goal<'_>, sighting: &Sighting) -> bool {
+        let way = goal.way_from(&sighting.pose, sighting.t_s);
+        let hit = self.oracle.cast_at(sighting.t_s, sighting.pose.position_ned_m, way);
+        // The parameter is 1 at the goal; the sky is infinitely far away.
         hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6)
     }
 
@@ -196,26 +200,26 @@ impl FlowPicture<'_> {
     }
 
     /// All positions in the picture at which it shows a goal.
-    fn places(&self, goal: Goal<'_>) -> Vec<Place> {
+    fn sightings(&self, goal: Goal<'_>) -> Vec<Sighting> {
         if let Some(t_s) = self.global_s {
             let pose = self.oracle.sequence.path.pose(t_s);
             let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px));
-            return px.map(|px| Place { px, t_s, pose }).into_iter().collect();
+            return px.map(|px| Sighting { px, t_s, pose }).into_iter().collect();
         }
-        let mut places: Vec<(f64, Place)> = Vec::new();
+        let mut sightings: Vec<(f64, Sighting)> = Vec::new();
         for field in &self.fields {
-            let found = self.places_of_field(field, goal).into_iter();
-            places.extend(found.map(|place| (self.to_field_px(field, place.px), place)));
+            let found = self.sightings_in_field(field, goal).into_iter();
+            sightings.extend(found.map(|sighting| (self.to_field_px(field, sighting.px), sighting)));
         }
         // A position belongs to the field whose image row it is in. Only what passes between the rows of both
         // fields is in the nearer one.
-        if places.iter().any(|(off_px, _)| *off_px <= 0.5) {
-            places.retain(|(off_px, _)| *off_px <= 0.5);
+        if sightings.iter().any(|(off_px, _)| *off_px <= 0.5) {
+            sightings.retain(|(off_px, _)| *off_px <= 0.5);
         } else {
-            places.sort_by(|a, b| a.0.total_cmp(&b.0));
-            places.truncate(1);
+            sightings.sort_by(|a, b| a.0.total_cmp(&b.0));
+            sightings.truncate(1);
         }
-        places.into_iter().map(|(_, place)| place).collect()
+        sightings.into_iter().map(|(_, sighting)| sighting).collect()
     }
 
     /// Distance to the nearest image row of a field; 0 without fields.
@@ -227,9 +231,9 @@ impl FlowPicture<'_> {
         off.min(2.0 - off)
     }
 
-    fn places_of_field(&self, field: &FieldScan, goal: Goal<'_>) -> Vec<Place> {
+    fn sightings_in_field(&self, field: &FieldScan, goal: Goal<'_>) -> Vec<Sighting> {
         let misses: Vec<Miss> = field
-            .places
+            .samples
             .iter()
             .map(|(along_px, t_s, pose)| (*along_px, self.miss(*along_px, *t_s, pose, goal)))
             .collect();
@@ -238,17 +242,17 @@ impl FlowPicture<'_> {
             if let Some(&after) = misses.get(k + 1)
                 && changes_sign(before, after)
             {
-                found.extend(self.place_between(field, goal, before, after));
+                found.extend(self.sighting_between(field, goal, before, after));
             }
             if let Some((turn, [low, high])) = self.turn_beyond_zero(field, goal, &misses, k) {
-                found.extend(self.place_between(field, goal, low, turn));
-                found.extend(self.place_between(field, goal, turn, high));
+                found.extend(self.sighting_between(field, goal, low, turn));
+                found.extend(self.sighting_between(field, goal, turn, high));
             }
         }
         found
     }
 
-    /// The place along the readout at which a goal is seen from the camera of another, less that other one.
+    /// The position along the readout at which a goal is seen from the camera of another, less that other one.
     fn miss(&self, along_px: f64, t_s: f64, pose: &CameraPose, goal: Goal<'_>) -> Option<f64> {
         Some(self.along(self.lens.show(pose, t_s, goal)?) - along_px)
     }
@@ -259,7 +263,13 @@ impl FlowPicture<'_> {
     }
 
     /// The solution between two misses of different signs.
-    fn place_between(&self, field: &FieldScan, goal: Goal<'_>, before: Miss, after: Miss) -> Option<Place> {
+    fn sighting_between(
+        &self,
+        field: &FieldScan,
+        goal: Goal<'_>,
+        before: Miss,
+        after: Miss,
+    ) -> Option<Sighting> {
         let (mut low, mut high) = (before.0, after.0);
         for _ in 0..BISECTIONS {
             let middle = self.miss_at(field, 0.5 * (low + high), goal);
@@ -267,7 +277,7 @@ impl FlowPicture<'_> {
         }
         let (t_s, pose) = self.camera(field, 0.5 * (low + high));
         let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px))?;
-        Some(Place { px, t_s, pose })
+        Some(Sighting { px, t_s, pose })
     }
 
     /// A miss of the other sign next to one that is less than those before and behind it, closed in on by thirds,
@@ -294,12 +304,12 @@ impl FlowPicture<'_> {
         }
         let (mut from, mut to) = (beside[0].0, beside[1].0);
         for _ in 0..THIRDS {
-            let places = [(2.0 * from + to) / 3.0, (from + 2.0 * to) / 3.0];
-            let [first, second] = places.map(|along_px| self.miss_at(field, along_px, goal));
+            let rows_px = [(2.0 * from + to) / 3.0, (from + 2.0 * to) / 3.0];
+            let [first, second] = rows_px.map(|along_px| self.miss_at(field, along_px, goal));
             if let Some(beyond) = [first, second].into_iter().find(|&miss| changes_sign(at, miss)) {
                 return Some((beyond, beside));
             }
-            if first.1?.abs() < second.1?.abs() { to = places[1] } else { from = places[0] }
+            if first.1?.abs() < second.1?.abs() { to = rows_px[1] } else { from = rows_px[0] }
         }
         None
     }

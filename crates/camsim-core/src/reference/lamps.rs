@@ -105,9 +105,13 @@ fn of_lamp(view: &FrameView<'_>, mesh: &Mesh, instants_s: &[f64]) -> Vec<Seen> {
         .map(|&t_s| {
             let bounds = mesh.bounds_between(t_s, t_s);
             let pose = path.pose(t_s);
-            let place_m = pose.ned_from_camera.conjugate() * (bounds.centre() - pose.position_ned_m);
+            let position_m = pose.ned_from_camera.conjugate() * (bounds.centre() - pose.position_ned_m);
             let radius_m = 0.5 * (bounds.max - bounds.min).length();
-            Seen { direction: place_m.normalize_or_zero(), radius: radius_m / place_m.length(), way: 0.0 }
+            Seen {
+                direction: position_m.normalize_or_zero(),
+                radius: radius_m / position_m.length(),
+                way: 0.0,
+            }
         })
         .collect();
     for k in 1..seen.len() {

@@ -95,7 +95,7 @@ impl LensInverse {
         near.and_then(|start| self.polish(start, wanted)).or_else(|| self.solve_from_nothing(wanted))
     }
 
-    /// Ideal `(u, v)` of a place in a pixel that this camera makes.
+    /// Ideal `(u, v)` of a position in a pixel that this camera makes.
     pub(super) fn ray_of(&self, pixel: [u32; 2], offset_px: DVec2) -> Option<DVec2> {
         let pixel = DVec2::from_array(pixel.map(f64::from));
         if self.holds(pixel) { self.ray(pixel + offset_px) } else { None }

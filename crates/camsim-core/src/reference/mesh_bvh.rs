@@ -16,7 +16,7 @@ const LEAF: usize = 4;
 /// Size of the traversal stack: the depth of the tree is at most log2 of the number of triangles.
 const STACK: usize = 64;
 /// Relative distance within which two hits at a shared edge count as one: rounding.
-const SAME_PLACE: f64 = 1e-12;
+const SAME_DEPTH: f64 = 1e-12;
 
 #[derive(Clone, Copy, Debug)]
 struct MeshTriangle {
@@ -146,7 +146,7 @@ impl MeshBvh {
                     on_edge
                         && layer.on_edge
                         && layer.hit.surface == hit.surface
-                        && (layer.hit.depth_m - t).abs() <= SAME_PLACE * t
+                        && (layer.hit.depth_m - t).abs() <= SAME_DEPTH * t
                 };
                 if !layers.iter().any(again) {
                     layers.push(BlendLayer { hit, alpha, on_edge });

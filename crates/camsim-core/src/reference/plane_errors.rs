@@ -75,7 +75,7 @@ pub(super) struct Compared<'a> {
     pub(super) near_px: f64,
 }
 
-/// Places around a pixel's centre, at most `near_px` from it.
+/// Positions around a pixel's centre, at most `near_px` from it.
 pub(super) fn beside_offsets(near_px: f64) -> impl Iterator<Item = DVec2> {
     (0..DIRECTIONS).flat_map(move |k| {
         let direction = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));

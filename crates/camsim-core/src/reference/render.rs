@@ -278,7 +278,7 @@ impl FrameJob<'_> {
         for batch in 0..max_batches {
             let (mut part, mut count) = (DVec3::ZERO, DVec3::ZERO);
             for i in batch * BATCH..(batch + 1) * BATCH {
-                let place = DVec2::new(
+                let position = DVec2::new(
                     (shift_x + f64::from(i) * steps[0]).fract(),
                     (shift_y + f64::from(i) * steps[1]).fract(),
                 );
@@ -288,14 +288,14 @@ impl FrameJob<'_> {
                     self.oracle.radiance_at(t_s, &pose, uv)
                 };
                 if let Some(others) = visible.red_and_blue {
-                    let rays = self.view.ray_of_red_and_blue([x, y], place - 0.5).unwrap_or_default();
+                    let rays = self.view.ray_of_red_and_blue([x, y], position - 0.5).unwrap_or_default();
                     for ((ray, is_visible), k) in rays.into_iter().zip(others).zip([0, 2]) {
                         let Some(uv) = ray.filter(|_| is_visible) else { continue };
                         part[k] += at(uv, instants)[k];
                         count[k] += 1.0;
                     }
                 }
-                let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
+                let Some(uv) = self.view.ray([x, y], position - 0.5) else { continue };
                 part += visible.own * at(uv, instants);
                 count += visible.own;
             }

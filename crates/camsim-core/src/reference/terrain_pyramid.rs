@@ -120,7 +120,7 @@ impl TerrainPyramid {
 }
 
 /// Chunk of a block, the block's first cell in that chunk, and its number of cells.
-fn place(terrain: &Terrain, block: [u32; 2]) -> (u32, [u32; 2], [u32; 2]) {
+fn cells_of(terrain: &Terrain, block: [u32; 2]) -> (u32, [u32; 2], [u32; 2]) {
     let first = block.map(|n| n * BLOCK);
     let chunk = first[1] / CHUNK_CELLS * terrain.chunk_grid[0] + first[0] / CHUNK_CELLS;
     let in_chunk = first.map(|n| n % CHUNK_CELLS);
@@ -129,7 +129,7 @@ fn place(terrain: &Terrain, block: [u32; 2]) -> (u32, [u32; 2], [u32; 2]) {
 }
 
 fn block_bounds(terrain: &Terrain, block: [u32; 2]) -> Bounds {
-    let (chunk, [i0, j0], [columns, rows]) = place(terrain, block);
+    let (chunk, [i0, j0], [columns, rows]) = cells_of(terrain, block);
     let mut bounds = Bounds::NONE;
     for j in j0..=j0 + rows {
         for i in i0..=i0 + columns {
@@ -141,7 +141,7 @@ fn block_bounds(terrain: &Terrain, block: [u32; 2]) -> Bounds {
 
 fn first_in_block(terrain: &Terrain, block: [u32; 2], ray: &Ray, mut limit: f64) -> Option<Hit> {
     const SIDE: usize = BLOCK as usize + 1;
-    let (chunk, [i0, j0], [columns, rows]) = place(terrain, block);
+    let (chunk, [i0, j0], [columns, rows]) = cells_of(terrain, block);
     let mut sheared = [[None::<ShearedPoint>; SIDE]; SIDE];
     for (j, row) in (j0..=j0 + rows).zip(&mut sheared) {
         for (i, sheared) in (i0..=i0 + columns).zip(row) {

@@ -69,9 +69,9 @@ impl FrameTiming {
         self.dt_along_s(f64::from(if self.reads_rows() { y } else { x }), y)
     }
 
-    /// Mid-exposure of a place along the readout, pixels, in the field of an image row: linear from row to row.
+    /// Mid-exposure of a position along the readout, pixels, in the field of an image row: linear from row to row.
     pub(super) fn dt_along_s(&self, along_px: f64, row: u32) -> f64 {
-        let (nth, count) = self.place_in_readout(along_px);
+        let (nth, count) = self.position_in_readout(along_px);
         let lag_s =
             if row.is_multiple_of(2) == (self.first_field == Parity::Even) { self.interlace_s } else { 0.0 };
         // Rows whose exposures begin at once have their middles half as far apart as their ends.
@@ -102,8 +102,8 @@ impl FrameTiming {
         }
     }
 
-    /// How many rows are read before a place along the readout, and how many are read one after the other.
-    fn place_in_readout(&self, along_px: f64) -> (f64, f64) {
+    /// How many rows are read before a position along the readout, and how many are read one after the other.
+    fn position_in_readout(&self, along_px: f64) -> (f64, f64) {
         let count = f64::from(self.lines());
         // What is between the two middle rows has their time.
         let from_edge = along_px.min(count - 1.0 - along_px).min(count / 2.0 - 1.0);
@@ -144,7 +144,7 @@ impl FrameTiming {
     /// How much longer than `exposure_ms` a pixel is exposed, seconds: with a global reset by the time for which
     /// it waits until it is read.
     pub(super) fn longer_s(&self, [x, y]: [u32; 2]) -> f64 {
-        let (nth, count) = self.place_in_readout(f64::from(if self.reads_rows() { y } else { x }));
+        let (nth, count) = self.position_in_readout(f64::from(if self.reads_rows() { y } else { x }));
         match self.reset {
             Reset::Rolling => 0.0,
             Reset::Global => self.readout_s * nth / count,

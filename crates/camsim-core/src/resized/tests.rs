@@ -71,7 +71,7 @@ fn changes() -> [ResizedSpec; 6] {
 }
 
 /// Centres of pixels of the delivered picture.
-fn places([width, height]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+fn pixels([width, height]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     (0..8).flat_map(move |j| (0..8).map(move |i| [i * (width - 1) / 7, j * (height - 1) / 7]))
 }
 
@@ -118,7 +118,7 @@ fn points_keep_their_rays_in_every_lens() {
         for spec in changes() {
             let (part, change) = resized(&full, spec.clone());
             let part = CameraModel::from_spec(&part).unwrap();
-            for at in places(change.size_px).map(point) {
+            for at in pixels(change.size_px).map(point) {
                 let [own, of_whole] =
                     [part.ray(at), whole.ray(change.calibrated_point(at))].map(Option::unwrap);
                 assert!((own - of_whole).length() < 1e-9, "{model:?} {spec:?} {at}");
@@ -159,7 +159,7 @@ fn zoom_and_the_lenses_of_colours_follow() {
         for primary in Primary::ALL {
             let [whole, part] =
                 [&full, &part].map(|spec| CameraModel::from_spec(&spec.of_primary(primary)).unwrap());
-            for at in places(change.size_px).map(point) {
+            for at in pixels(change.size_px).map(point) {
                 let [own, of_whole] =
                     [part.ray(at), whole.ray(change.calibrated_point(at))].map(Option::unwrap);
                 assert!((own - of_whole).length() < 1e-9, "{primary:?} {at}");
@@ -190,7 +190,7 @@ fn vignetting_and_image_circle_are_those_of_the_same_points() {
     };
     // Twice the size has pixel centres between those of the calibrated picture, a crop has the same.
     let (part, change) = resized(&full, crop([64, 32, 500, 400]));
-    for at in places(change.size_px) {
+    for at in pixels(change.size_px) {
         let there = change.calibrated_point(point(at));
         let there = [there.x as u32, there.y as u32];
         for primary in Primary::ALL {
@@ -200,7 +200,7 @@ fn vignetting_and_image_circle_are_those_of_the_same_points() {
     }
     // Of an odd number of pixels in one, the middle one has the same centre.
     let (part, change) = resized(&full, binning(3.0));
-    for at in places(change.size_px) {
+    for at in pixels(change.size_px) {
         let there = change.calibrated_point(point(at));
         let own = weight(&part, at, Primary::Red);
         assert!(
@@ -236,7 +236,7 @@ fn rows_keep_the_time_from_one_to_the_next() {
             // A part about the centre has the times of the same rows.
             let (part, change) = resized(&full, crop([100, 80, 440, 320]));
             let own = Shutter::from_spec(&part.shutter, 30.0, part.size_px).unwrap();
-            for at in places(change.size_px) {
+            for at in pixels(change.size_px) {
                 let there = change.calibrated_point(point(at));
                 let expected_s = whole.dt_pixel_s(there.x as u32, there.y as u32);
                 assert!((own.dt_pixel_s(at[0], at[1]) - expected_s).abs() < 1e-12, "{readout:?} {at:?}");
@@ -244,7 +244,7 @@ fn rows_keep_the_time_from_one_to_the_next() {
             // A binned row has the mean of its rows.
             let (part, _) = resized(&full, binning(2.0));
             let own = Shutter::from_spec(&part.shutter, 30.0, part.size_px).unwrap();
-            for [x, y] in places(part.size_px) {
+            for [x, y] in pixels(part.size_px) {
                 let mean = 0.5 * (whole.dt_pixel_s(2 * x, 2 * y) + whole.dt_pixel_s(2 * x + 1, 2 * y + 1));
                 assert!((own.dt_pixel_s(x, y) - mean).abs() < 1e-12, "{readout:?} {x} {y}");
             }
@@ -266,7 +266,7 @@ fn how_much_later_the_rows_of_a_part_are_is_known() {
             let (part, change) = resized(&full, spec);
             let own = Shutter::from_spec(&part.shutter, 30.0, part.size_px).unwrap();
             let time_s = |at: [u32; 2]| own.dt_pixel_s(at[0], at[1]);
-            for at in places(change.size_px) {
+            for at in pixels(change.size_px) {
                 let there = change.calibrated_point(point(at));
                 let later_s = time_s(at) - whole.dt_pixel_s(there.x as u32, there.y as u32);
                 assert!((1e3 * later_s - part.made_of.rows_later_ms).abs() < 1e-9, "{readout:?} {at:?}");

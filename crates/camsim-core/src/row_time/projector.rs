@@ -18,7 +18,7 @@ const STRAIGHT_PX: f64 = 3e-4;
 /// Steps from row to row, at most.
 const MOST_STEPS: usize = 6;
 
-/// A place at which a frame shows a point, within the picture's outer border.
+/// A position at which a frame shows a point, within the picture's outer border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shown {
     /// Pixel coordinates.
@@ -52,7 +52,7 @@ impl ImageGain {
     pub fn new(camera: &CameraModel) -> Self {
         const SIDE: u32 = 16;
         let last = camera.size_px.map(|side| f64::from(side) - 1.0);
-        let of_place = |i: u32| {
+        let gains = |i: u32| {
             let fraction = [i % (SIDE + 1), i / (SIDE + 1)].map(|k| f64::from(k) / f64::from(SIDE));
             let px = DVec2::new(fraction[0] * last[0], fraction[1] * last[1]);
             // The norm of all elements bounds that of a matrix.
@@ -66,8 +66,8 @@ impl ImageGain {
             let jacobian = camera.lens.jacobian(uv);
             Some((norm(&[jacobian.x_axis, jacobian.y_axis]), 1.0 + uv.length_squared()))
         };
-        let places = (0..(SIDE + 1).pow(2)).filter_map(of_place);
-        places.fold(Self { turn_px: 0.0, shift_px: 0.0 }, |most, (gain, secant2)| Self {
+        let all = (0..(SIDE + 1).pow(2)).filter_map(gains);
+        all.fold(Self { turn_px: 0.0, shift_px: 0.0 }, |most, (gain, secant2)| Self {
             turn_px: most.turn_px.max(gain * secant2),
             shift_px: most.shift_px.max(gain * secant2.sqrt()),
         })
@@ -178,21 +178,21 @@ impl RowProjector<'_> {
     pub fn by_steps(&self, point: WorldPoint<'_>, guess_px: DVec2) -> Option<Shown> {
         let limits = self.limits?;
         let field = self.frame.fields.first()?;
-        let (place, is_far) = match point {
+        let (target, is_far) = match point {
             WorldPoint::At(point_ned_m) => (point_ned_m, false),
             WorldPoint::Towards(direction_ned) => (direction_ned, true),
             WorldPoint::On { .. } => return None,
         };
         let last = self.rows.len() - 1;
         if last == 0 {
-            let seen = self.project(0, place, is_far)?;
+            let seen = self.project(0, target, is_far)?;
             return self.shown(field.times_s[0], self.rows[0].position_ned_m, seen);
         }
         let along = |seen: &Projection| field.row_of(self.frame.along(seen.px));
         let guess = field.row_of(self.frame.along(guess_px));
         let mut row = (guess.max(0.0) as usize).min(last - 1);
         for _ in 0..MOST_STEPS {
-            let (here, next) = (self.project(row, place, is_far)?, self.project(row + 1, place, is_far)?);
+            let (here, next) = (self.project(row, target, is_far)?, self.project(row + 1, target, is_far)?);
             let (miss, miss_next) = (along(&here) - row as f64, along(&next) - (row + 1) as f64);
             let fraction = miss / (miss - miss_next);
             // Half a row before the first and behind the last one belongs to these.
@@ -228,9 +228,9 @@ impl RowProjector<'_> {
     }
 
     #[inline]
-    fn project(&self, row: usize, place: DVec3, is_far: bool) -> Option<Projection> {
+    fn project(&self, row: usize, target: DVec3, is_far: bool) -> Option<Projection> {
         let Row { camera_from_ned, position_ned_m } = self.rows[row];
-        let ray = camera_from_ned * if is_far { place } else { place - position_ned_m };
+        let ray = camera_from_ned * if is_far { target } else { target - position_ned_m };
         let camera = &self.frame.camera;
         let uv = ray.truncate() / ray.z;
         if ray.z > 0.0 && uv.length_squared() < self.contained_radius2 {

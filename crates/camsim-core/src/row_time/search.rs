@@ -21,7 +21,7 @@ use crate::pose::CameraPose;
 const INTERVALS: usize = 4;
 const INTERVALS_A_TURN: f64 = 12.0;
 const MOST_INTERVALS: usize = 64;
-/// What gains outside of the picture, and between the places at which they are known, have beyond those.
+/// What gains outside of the picture, and between the positions at which they are known, have beyond those.
 const GAIN_RESERVE: f64 = 1.25;
 /// Way of a point that moves, as a multiple of the distance between its ends.
 const OWN_WAY: f64 = 1.5;
@@ -47,7 +47,7 @@ pub(super) struct Search<'a> {
 #[derive(Clone, Copy)]
 struct Sample {
     miss: f64,
-    /// The same, but of the nearest place in the picture.
+    /// The same, but of the nearest position in the picture.
     least_miss: f64,
     /// How far it is beside the picture, rows.
     beside: f64,
@@ -59,7 +59,7 @@ struct Sample {
 /// A fractional row and its miss.
 type Bracket = [(f64, f64); 2];
 /// A node with what the camera shows there.
-type Place = (usize, Option<Sample>);
+type Node = (usize, Option<Sample>);
 
 impl<'a> Search<'a> {
     pub fn new(frame: &'a FrameCamera, field: &'a Field, point: WorldPoint<'a>) -> Self {
@@ -75,7 +75,7 @@ impl<'a> Search<'a> {
             return seen.map(|seen| self.frame.seen(t_s, pose, seen)).into_iter().collect();
         }
         let last = self.field.last_node();
-        let ends = [0, last].map(|node| self.place(node));
+        let ends = [0, last].map(|node| self.at_node(node));
         if let [(_, Some(first)), (_, Some(end))] = ends
             && self.is_monotone(0, &first, last, &end)
         {
@@ -85,7 +85,7 @@ impl<'a> Search<'a> {
         let intervals = self.intervals().min(last);
         let mut before = ends[0];
         for i in 1..=intervals {
-            let here = if i == intervals { ends[1] } else { self.place(i * last / intervals) };
+            let here = if i == intervals { ends[1] } else { self.at_node(i * last / intervals) };
             self.solutions_between(before, here);
             before = here;
         }
@@ -100,7 +100,7 @@ impl<'a> Search<'a> {
         (INTERVALS + (INTERVALS_A_TURN * turns) as usize).min(MOST_INTERVALS)
     }
 
-    fn place(&self, node: usize) -> Place {
+    fn at_node(&self, node: usize) -> Node {
         (node, self.sample(node))
     }
 
@@ -123,7 +123,7 @@ impl<'a> Search<'a> {
     }
 
     /// Looks for solutions between two nodes.
-    fn solutions_between(&mut self, low: Place, high: Place) {
+    fn solutions_between(&mut self, low: Node, high: Node) {
         let ((from, low_sample), (to, high_sample)) = (low, high);
         match (low_sample, high_sample) {
             // Beyond the lens at both, the point may come into the picture between.
@@ -153,7 +153,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        let middle = self.place(from.midpoint(to));
+        let middle = self.at_node(from.midpoint(to));
         self.solutions_between(low, middle);
         self.solutions_between(middle, high);
     }
@@ -274,19 +274,18 @@ impl<'a> Search<'a> {
         let is_above = a.miss >= 0.0;
         let (mut from, mut to) = (low, high);
         for _ in 0..GOLDEN_STEPS {
-            let places = [to - GOLDEN * (to - from), from + GOLDEN * (to - from)];
-            let [Some(first), Some(second)] = places.map(|row| self.seen_at(row).map(|(miss, ..)| miss))
-            else {
+            let rows = [to - GOLDEN * (to - from), from + GOLDEN * (to - from)];
+            let [Some(first), Some(second)] = rows.map(|row| self.seen_at(row).map(|(miss, ..)| miss)) else {
                 return;
             };
-            for (row, miss) in places.into_iter().zip([first, second]) {
+            for (row, miss) in rows.into_iter().zip([first, second]) {
                 if (miss >= 0.0) != is_above {
                     self.close_in([(low, a.miss), (row, miss)]);
                     self.close_in([(row, miss), (high, b.miss)]);
                     return;
                 }
             }
-            if first.abs() < second.abs() { to = places[1] } else { from = places[0] }
+            if first.abs() < second.abs() { to = rows[1] } else { from = rows[0] }
         }
     }
 }

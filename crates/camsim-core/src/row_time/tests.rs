@@ -204,12 +204,12 @@ fn what_no_row_shows_is_where_the_first_or_last_row_has_it() {
         let frame = FrameCamera::new(path(0.4), camera(), &shutter, 0.5);
         let mut count = 0;
         for point in points().filter(|&point| frame.find_all(point).is_empty()) {
-            let places = [0, shutter.lines() - 1].map(|line| {
+            let ends = [0, shutter.lines() - 1].map(|line| {
                 let t_s = 0.5 + shutter.dt_row_s(line);
                 let (px, _) = frame.camera.show(&frame.path.pose(t_s), t_s, point)?;
                 Some(((frame.along(px) - f64::from(line)).abs(), px))
             });
-            let nearest = places.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
+            let nearest = ends.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
             assert_eq!(frame.outside(point, DVec2::ZERO), nearest.map(|(_, px)| px), "{readout:?} {point:?}");
             count += usize::from(nearest.is_some());
         }
@@ -238,7 +238,7 @@ fn a_wide_lens_shows_what_is_beside_and_behind() {
     let pose = path(0.0).pose(0.5);
     for point in points_around() {
         let to_point = match point {
-            WorldPoint::At(place) => place - pose.position_ned_m,
+            WorldPoint::At(position) => position - pose.position_ned_m,
             WorldPoint::Towards(direction) => direction,
             WorldPoint::On { .. } => continue,
         };
@@ -302,7 +302,7 @@ fn interlaced_rows_belong_to_their_own_field() {
 fn a_point_that_moves_is_found_where_a_search_finds_it() {
     let spec = ShutterSpec { readout_ms: 30.0, ..ShutterSpec::default() };
     let frame = FrameCamera::new(path(0.0), camera(), &shutter(spec), 0.5);
-    // It turns about the place below the picture's middle, 12 times a second: half as fast as rows are
+    // It turns about the position below the picture's middle, 12 times a second: half as fast as rows are
     // read.
     let hub = DAffine3::from_translation(DVec3::new(65.0, 3.0, 0.0));
     let track = Track::Spin { axis: DVec3::Z, hz: 12.0, phase_rad: 0.3 };

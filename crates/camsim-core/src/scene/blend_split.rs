@@ -244,12 +244,12 @@ struct SplitShape {
 impl SplitShape {
     /// Splits the edge between two vertices at a fraction of its length, for all triangles that have it.
     fn split_edge(&mut self, from: u32, to: u32, part: f64) {
-        let place = |work: &Self, corner: u32| work.shape.vertices[corner as usize].position_m;
-        let ends = [place(self, from), place(self, to)];
+        let corner_m = |work: &Self, corner: u32| work.shape.vertices[corner as usize].position_m;
+        let ends = [corner_m(self, from), corner_m(self, to)];
         self.between.clear();
         for k in 0..self.pieces.len() {
             let corners = self.pieces[k].corners;
-            let which = |end: [f32; 3]| corners.iter().position(|&corner| place(self, corner) == end);
+            let which = |end: [f32; 3]| corners.iter().position(|&corner| corner_m(self, corner) == end);
             let (Some(i), Some(j)) = (which(ends[0]), which(ends[1])) else { continue };
             let middle = self.corner_between(corners[i], corners[j], part);
             let mut other = Piece { corners, of: self.pieces[k].of };

@@ -42,7 +42,7 @@ struct ProjectedTriangle {
 /// A triangle with nothing left behind it; the farthest has the highest priority.
 struct Ready {
     distance_m: f64,
-    place: u32,
+    triangle: u32,
 }
 
 /// A depth order of triangles.
@@ -99,25 +99,25 @@ fn topological_order(
     in_front: &[Vec<u32>],
     mut behind: Vec<u32>,
 ) -> DepthOrder {
-    let ready = |place: u32| Ready { distance_m: projected[place as usize].distance_m, place };
+    let ready = |triangle: u32| Ready { distance_m: projected[triangle as usize].distance_m, triangle };
     let mut open: BinaryHeap<Ready> =
-        (0..projected.len() as u32).filter(|&place| behind[place as usize] == 0).map(ready).collect();
+        (0..projected.len() as u32).filter(|&triangle| behind[triangle as usize] == 0).map(ready).collect();
     let mut from_afar: Vec<u32> = (0..projected.len() as u32).collect();
-    from_afar.sort_by_key(|&place| std::cmp::Reverse(ready(place)));
+    from_afar.sort_by_key(|&triangle| std::cmp::Reverse(ready(triangle)));
     let mut from_afar = from_afar.into_iter();
     let mut taken = vec![false; projected.len()];
     let mut order = DepthOrder { indices: Vec::with_capacity(projected.len()), out_of_order: 0 };
     while order.indices.len() < projected.len() {
-        let next = open.pop().map(|ready| ready.place).or_else(|| {
+        let next = open.pop().map(|ready| ready.triangle).or_else(|| {
             order.out_of_order += 1;
-            from_afar.find(|&place| !taken[place as usize])
+            from_afar.find(|&triangle| !taken[triangle as usize])
         });
-        let Some(place) = next else { break };
-        if std::mem::replace(&mut taken[place as usize], true) {
+        let Some(triangle) = next else { break };
+        if std::mem::replace(&mut taken[triangle as usize], true) {
             continue;
         }
-        order.indices.push(place);
-        for &other in &in_front[place as usize] {
+        order.indices.push(triangle);
+        for &other in &in_front[triangle as usize] {
             behind[other as usize] -= 1;
             if behind[other as usize] == 0 {
                 open.push(ready(other));
@@ -210,7 +210,7 @@ fn separates(triangle: &[DVec2; 3], other: &[DVec2; 3]) -> bool {
 
 impl Ord for Ready {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.distance_m.total_cmp(&other.distance_m).then(other.place.cmp(&self.place))
+        self.distance_m.total_cmp(&other.distance_m).then(other.triangle.cmp(&self.triangle))
     }
 }
 
@@ -246,12 +246,12 @@ mod tests {
 
     /// Number of rays of a grid for which a nearer triangle is drawn before a farther one.
     fn wrong_pixels(triangles: &[[DVec3; 3]], order: &[u32]) -> usize {
-        let places = (0..60 * 60).map(|i| DVec2::new(f64::from(i % 60), f64::from(i / 60)) / 30.0 - 0.99);
+        let positions = (0..60 * 60).map(|i| DVec2::new(f64::from(i % 60), f64::from(i / 60)) / 30.0 - 0.99);
         let is_wrong = |uv: &DVec2| {
             let depths: Vec<f64> = order.iter().filter_map(|&k| depth(triangles[k as usize], *uv)).collect();
             depths.windows(2).any(|pair| pair[0] < pair[1] - 1e-9)
         };
-        places.filter(is_wrong).count()
+        positions.filter(is_wrong).count()
     }
 
     fn by_distance(triangles: &[[DVec3; 3]]) -> Vec<u32> {
@@ -342,7 +342,7 @@ mod tests {
         let done = split_intersecting_blended(&mut meshes);
         let after = corners(&meshes);
         eprintln!(
-            "{} -> {} triangles, {} -> {} places in the wrong order",
+            "{} -> {} triangles, {} -> {} positions in the wrong order",
             before.len(),
             after.len(),
             wrong(&before),

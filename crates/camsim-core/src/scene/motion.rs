@@ -178,7 +178,7 @@ impl Joint {
         }
     }
 
-    /// Box of all places between two instants of what is in `bounds` at t = 0.
+    /// Box of all positions between two instants of what is in `bounds` at t = 0.
     fn bounds(&self, bounds: &Aabb, from_s: f64, to_s: f64) -> Aabb {
         let start = self.frame.point(self.start.position_m);
         let mut centres = Aabb::EMPTY;

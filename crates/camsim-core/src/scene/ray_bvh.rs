@@ -107,12 +107,12 @@ impl RayBvh {
                 let lane = is_met.trailing_zeros() as usize;
                 is_met &= is_met - 1;
                 // The nearest box is pushed last, so it is popped first.
-                let mut place = count;
-                while place > first && waiting[place - 1].0 < enter[lane] {
-                    waiting[place] = waiting[place - 1];
-                    place -= 1;
+                let mut slot = count;
+                while slot > first && waiting[slot - 1].0 < enter[lane] {
+                    waiting[slot] = waiting[slot - 1];
+                    slot -= 1;
                 }
-                waiting[place] = (enter[lane], holds[lane]);
+                waiting[slot] = (enter[lane], holds[lane]);
                 count += 1;
             }
         }

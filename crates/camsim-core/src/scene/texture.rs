@@ -201,7 +201,7 @@ impl Texture {
         self.mips_with_border(form, None)
     }
 
-    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) in place of the outermost texels
+    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) instead of the outermost texels
     /// of each level. If the outermost texels of the texture have that colour too, a clamped texture
     /// continues with the same colour at every level.
     pub fn mips_with_border(&self, form: TexelForm, border: Option<[u8; 4]>) -> Vec<MipLevel> {

@@ -97,7 +97,7 @@ impl TileGrid {
                 for column in 0..across {
                     let tile = self.first[level] + row * across + column;
                     table[tile as usize] = match slot_of(tile) {
-                        Some(place) => place << 8,
+                        Some(index) => index << 8,
                         None => self.levels_to_resident(&table, level, [column, row]),
                     };
                 }

@@ -16,7 +16,7 @@ const STREAM: u32 = 40;
 pub struct Barometer {
     /// Its keys.
     pub spec: BarometerSpec,
-    /// Its place.
+    /// Its position.
     pub mount: SensorMount,
     /// Its clock.
     pub clock: SampleClock,
@@ -46,7 +46,7 @@ impl Barometer {
     pub(super) fn new(spec: &BarometerSpec, seed: u64, input: &SensorInput) -> Result<Self, SensorError> {
         let keys = [spec.rate_hz, spec.clock_offset_ms, spec.jitter_ms];
         let clock = SampleClock::new(("barometer", &spec.name), keys, seed, input)?;
-        input.check_place("barometer", &spec.name, "the height")?;
+        input.check_position("barometer", &spec.name, "the height")?;
         let figures = ErrorFigures {
             white: DVec3::X * spec.sigma_pa,
             bias: DVec3::X * spec.bias_pa,
@@ -69,8 +69,8 @@ impl Barometer {
         let mut bias = Series::new(&self.errors, self.clock.first());
         self.clock.times().map(move |time| {
             let motion = self.mount.motion(&self.input.trajectory.state(time.t_s));
-            // A place is known, as `new` has checked.
-            let true_msl_m = earth.place(motion.position_ned_m).map_or(f64::NAN, |at| earth.msl_m(at));
+            // A position is known, as `new` has checked.
+            let true_msl_m = earth.geodetic(motion.position_ned_m).map_or(f64::NAN, |at| earth.msl_m(at));
             let scale = self.spec.sea_level_pa / atmosphere::SEA_LEVEL_PA;
             let true_pressure_pa = scale * atmosphere::isa_pressure_pa(true_msl_m);
             let bias_pa = self.errors.bias(&bias.next()).x;

@@ -1,4 +1,4 @@
-//! Gravity, rotation and place of the Earth beneath the flight.
+//! The Earth beneath the flight: gravity, rotation and geodetic position.
 
 use glam::DVec3;
 
@@ -7,7 +7,7 @@ use crate::{
     scenario::HeightReference,
 };
 
-/// Gravity where the place of the flight is not known, m/s^2 (3rd CGPM, 1901).
+/// Gravity where the position of the flight is not known, m/s^2 (3rd CGPM, 1901).
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
 /// Normal gravity at the equator, m/s^2 (NIMA TR8350.2, table 3.4).
@@ -41,7 +41,7 @@ pub struct Earth {
 }
 
 impl Earth {
-    /// `frame` is `None` where the place of the flight is not known.
+    /// `frame` is `None` where the position of the flight is not known.
     #[must_use]
     pub fn new(frame: Option<LocalFrame>, heights: HeightReference) -> Self {
         Self { frame, heights, geoid: GeoidCache::new() }
@@ -53,14 +53,14 @@ impl Earth {
         self.frame.as_ref()
     }
 
-    /// Place of the local frame's origin on the ellipsoid.
+    /// Position of the local frame's origin on the ellipsoid.
     #[must_use]
     pub fn origin(&mut self) -> Option<Geodetic> {
-        self.place(DVec3::ZERO)
+        self.geodetic(DVec3::ZERO)
     }
 
-    /// Geodetic place of a point, with its height above the ellipsoid.
-    pub(super) fn place(&mut self, point_ned_m: DVec3) -> Option<Geodetic> {
+    /// Geodetic position of a point, with its height above the ellipsoid.
+    pub(super) fn geodetic(&mut self, point_ned_m: DVec3) -> Option<Geodetic> {
         let at = self.frame?.geodetic_from_ned(point_ned_m);
         Some(match self.heights {
             HeightReference::Ellipsoid => at,
@@ -68,15 +68,15 @@ impl Earth {
         })
     }
 
-    /// Height above mean sea level (EGM96) of a place with a height above the ellipsoid.
+    /// Height above mean sea level (EGM96) of a position with a height above the ellipsoid.
     pub(super) fn msl_m(&mut self, at: Geodetic) -> f64 {
         at.height_m - self.geoid.undulation_m(at)
     }
 
     /// Gravity at a point: along the normal of the ellipsoid, or straight down and [`STANDARD_GRAVITY_M_S2`]
-    /// where the place is not known.
+    /// where the position is not known.
     pub fn gravity_ned_m_s2(&mut self, point_ned_m: DVec3) -> DVec3 {
-        match (self.place(point_ned_m), self.frame) {
+        match (self.geodetic(point_ned_m), self.frame) {
             (Some(at), Some(frame)) => frame.down_ned(at) * normal_gravity_m_s2(at.lat_rad, at.height_m),
             _ => DVec3::Z * STANDARD_GRAVITY_M_S2,
         }

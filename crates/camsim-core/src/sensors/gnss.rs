@@ -18,7 +18,7 @@ const DROPOUT_STREAM: u32 = 36;
 pub struct Gnss {
     /// Its keys.
     pub spec: GnssSpec,
-    /// Place of its antenna.
+    /// Position of its antenna.
     pub mount: SensorMount,
     /// Its clock.
     pub clock: SampleClock,
@@ -100,7 +100,7 @@ impl Gnss {
     pub(super) fn new(spec: &GnssSpec, seed: u64, input: &SensorInput) -> Result<Self, SensorError> {
         let keys = [spec.rate_hz, spec.clock_offset_ms, spec.jitter_ms];
         let clock = SampleClock::new(("gnss", &spec.name), keys, seed, input)?;
-        input.check_place("gnss", &spec.name, "latitude and longitude")?;
+        input.check_position("gnss", &spec.name, "latitude and longitude")?;
         let normals = Normals::new(seed, &spec.name);
         let position = ErrorFigures {
             white: axes(spec.sigma_m),
@@ -156,8 +156,8 @@ impl Gnss {
     }
 }
 
-/// `None` where the place is not known, which [`Gnss::new`] refuses.
+/// `None` where the position is not known, which [`Gnss::new`] refuses.
 fn fix(earth: &mut Earth, position_ned_m: DVec3, velocity_ned_m_s: DVec3) -> Option<Fix> {
-    let at = earth.place(position_ned_m)?;
+    let at = earth.geodetic(position_ned_m)?;
     Some(Fix { at, msl_m: earth.msl_m(at), position_ned_m, velocity_ned_m_s })
 }

@@ -1,6 +1,6 @@
 //! Inertial measurement unit.
 //!
-//! At the sensor's place p, in its own axes S, with the motion of the platform in the local frame N:
+//! At the sensor's position p, in its own axes S, with the motion of the platform in the local frame N:
 //!
 //! ```text
 //! true rate            w + R_SN e                       e: the Earth's rotation, with `earth_rate`
@@ -32,7 +32,7 @@ const ACCEL_STREAM: u32 = 24;
 pub struct Imu {
     /// Its keys.
     pub spec: ImuSpec,
-    /// Its place and axes, without vibration.
+    /// Its position and axes, without vibration.
     pub mount: SensorMount,
     /// The camera, if it shakes and the unit is on it.
     shaking: Option<ShakingPart>,
@@ -125,7 +125,7 @@ impl Imu {
         let clock = SampleClock::new(("imu", &spec.name), keys, seed, input)?;
         let earth_rate_ned_rad_s = match spec.earth_rate {
             false => DVec3::ZERO,
-            true => input.earth.rate_ned_rad_s().ok_or_else(|| SensorError::NoPlace {
+            true => input.earth.rate_ned_rad_s().ok_or_else(|| SensorError::NoPosition {
                 kind: "imu",
                 name: spec.name.clone(),
                 reason: "earth_rate",

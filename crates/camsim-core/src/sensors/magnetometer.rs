@@ -28,7 +28,7 @@ const MODEL_HEIGHTS_M: [f64; 2] = [-1000.0, 850e3];
 pub struct Magnetometer {
     /// Its keys.
     pub spec: MagnetometerSpec,
-    /// Its place and axes.
+    /// Its position and axes.
     pub mount: SensorMount,
     /// Its clock.
     pub clock: SampleClock,
@@ -81,8 +81,8 @@ impl Field {
             Self::Given(field_ned_ut) => return Ok(*field_ned_ut),
             Self::Model(date) => *date,
         };
-        let (Some(at), Some(frame)) = (earth.place(point_ned_m), earth.frame()) else {
-            return Err("the place is not known".into());
+        let (Some(at), Some(frame)) = (earth.geodetic(point_ned_m), earth.frame()) else {
+            return Err("the position is not known".into());
         };
         Ok(frame.ned_from_local(at) * model_field_ut(at, date)?)
     }
@@ -107,7 +107,7 @@ impl Magnetometer {
         let keys = [spec.rate_hz, spec.clock_offset_ms, spec.jitter_ms];
         let clock = SampleClock::new(("magnetometer", &spec.name), keys, seed, input)?;
         if spec.field_ned_ut.is_none() {
-            input.check_place("magnetometer", &spec.name, "date")?;
+            input.check_position("magnetometer", &spec.name, "date")?;
         }
         let no_field = |problem| SensorError::NoField { name: spec.name.clone(), problem };
         let field = Field::of(spec).map_err(no_field)?;

@@ -1,4 +1,4 @@
-//! Place and orientation of sensors on the platform.
+//! Position and orientation of sensors on the platform.
 
 use glam::{DMat4, DQuat, DVec3};
 
@@ -9,7 +9,7 @@ use crate::{
     scenario::{MountSpec, SensorAxes, SensorMountSpec},
 };
 
-/// Place and axes of a sensor in the body's frame.
+/// Position and axes of a sensor in the body's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorMount {
     /// Takes coordinates of the sensor's axes to those of the body (FRD).
@@ -52,7 +52,7 @@ impl SensorMount {
     }
 
     /// Motion of the sensor on a part that shakes against a body in motion. With the part's rotation V about its
-    /// centre c, displacement d and the sensor's place r without vibration, the lever arm is `c + d + V (r - c)`.
+    /// centre c, displacement d and the sensor's position r without vibration, the lever arm is `c + d + V (r - c)`.
     pub(super) fn motion_on(&self, part: &ShakingPart, t_s: f64, body: &BodyState) -> SensorMotion {
         let shake = part.vibration.shake(t_s);
         let spin_rad_s = shake.rate_rad_s;

@@ -21,7 +21,7 @@ mod positions;
 mod shaking;
 mod strapdown;
 
-fn place() -> LocalFrame {
+fn local_frame() -> LocalFrame {
     LocalFrame::new(Geodetic::from_deg(46.7, 9.85, 2100.0))
 }
 

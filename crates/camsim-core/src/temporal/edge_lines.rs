@@ -71,7 +71,7 @@ pub fn edge_line(
         return None;
     }
     let threshold = 0.5 * (low + high);
-    let member = |(place, w): (DVec2, f64)| (place, f64::from(u8::from(w > threshold)));
+    let member = |(at_px, w): (DVec2, f64)| (at_px, f64::from(u8::from(w > threshold)));
     let (normal, offset_px) = fitted(&neighbours.into_iter().map(member).collect::<Vec<_>>(), 3)
         .filter(|line| line.1.abs() <= 1.0)?;
     REACH
@@ -80,10 +80,10 @@ pub fn edge_line(
             let members: Vec<Member> = along(normal, offset_px, reach)
                 .into_iter()
                 .flat_map(|step| samples(step).map(move |sample| (step, sample)))
-                .filter(|(step, (place, _))| {
+                .filter(|(step, (at_px, _))| {
                     *step == [0, 0]
-                        || ((normal.dot(*place) - offset_px).abs() < BAND
-                            && normal.perp_dot(*place).abs() < reach)
+                        || ((normal.dot(*at_px) - offset_px).abs() < BAND
+                            && normal.perp_dot(*at_px).abs() < reach)
                 })
                 .map(|(_, sample)| member(sample))
                 .take(MAX_MEMBERS)
@@ -118,8 +118,8 @@ fn fitted(members: &[Member], steps: u32) -> Option<(DVec2, f64)> {
 fn step(line: DVec3, members: &[Member]) -> DVec3 {
     let mut gradient = DVec3::new(RIDGE * line.x, RIDGE * line.y, 0.0);
     let mut matrix = DMat3::from_diagonal(DVec3::new(RIDGE, RIDGE, 1e-4));
-    for (place, nearer) in members {
-        let position = place.extend(-1.0);
+    for (at_px, nearer) in members {
+        let position = at_px.extend(-1.0);
         let fraction = 1.0 / (1.0 + (-line.dot(position)).exp());
         gradient += (fraction - nearer) * position;
         let weight = fraction * (1.0 - fraction);
@@ -131,7 +131,7 @@ fn step(line: DVec3, members: &[Member]) -> DVec3 {
 
 /// Whether every sample lies on its own side, with at least one on each.
 fn separates(normal: DVec2, offset_px: f64, members: &[Member]) -> bool {
-    let on_side = |&(place, nearer): &Member| (2.0 * nearer - 1.0) * (normal.dot(place) - offset_px) > -SLACK;
+    let on_side = |&(at_px, nearer): &Member| (2.0 * nearer - 1.0) * (normal.dot(at_px) - offset_px) > -SLACK;
     let nearer = members.iter().filter(|member| member.1 > 0.5).count();
     members.iter().all(on_side) && nearer > 0 && nearer < members.len()
 }
@@ -147,10 +147,10 @@ mod tests {
     fn of(nearer: &dyn Fn(DVec2) -> bool) -> (Option<EdgeLine>, f64) {
         let middle = SIDE / 2;
         let depth = |[x, y]: [i64; 2], i: usize| {
-            let place = DVec2::new((x - middle) as f64, (y - middle) as f64)
+            let at_px = DVec2::new((x - middle) as f64, (y - middle) as f64)
                 + SupersampledImage::SAMPLE_POSITIONS[i]
                 - 0.5;
-            if nearer(place) { 1.0 / 40.0 } else { 1.0 / 60.0 }
+            if nearer(at_px) { 1.0 / 40.0 } else { 1.0 / 60.0 }
         };
         let own = (0..4).filter(|&i| depth([middle; 2], i) > 0.02).count() as f64 / 4.0;
         (edge_line([middle; 2], [SIDE; 2], &depth), own)
@@ -158,8 +158,8 @@ mod tests {
 
     fn fraction(nearer: &dyn Fn(DVec2) -> bool) -> f64 {
         const N: u32 = 48;
-        let place = |i: u32| DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N) - 0.5;
-        (0..N * N).filter(|&i| nearer(place(i))).count() as f64 / f64::from(N * N)
+        let at_px = |i: u32| DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N) - 0.5;
+        (0..N * N).filter(|&i| nearer(at_px(i))).count() as f64 / f64::from(N * N)
     }
 
     #[test]
@@ -169,12 +169,12 @@ mod tests {
             let angle = f64::from(k) * 2.399_963;
             let offset = 1.3 * (f64::from(k) * 0.618_034).fract() - 0.65;
             let normal = DVec2::from_angle(angle);
-            let truth = fraction(&|place| normal.dot(place) > offset);
+            let truth = fraction(&|at_px| normal.dot(at_px) > offset);
             if truth <= 0.0 || truth >= 1.0 {
                 continue;
             }
-            let (line, own) = of(&|place| normal.dot(place) > offset);
-            let covered = line.map_or(own, |line| fraction(&|place| line.normal.dot(place) > line.offset_px));
+            let (line, own) = of(&|at_px| normal.dot(at_px) > offset);
+            let covered = line.map_or(own, |line| fraction(&|at_px| line.normal.dot(at_px) > line.offset_px));
             without += u32::from(line.is_none());
             by_line += (covered - truth).powi(2);
             by_samples += (own - truth).powi(2);
@@ -193,8 +193,8 @@ mod tests {
         for k in 0..40 {
             let (x, y) =
                 (DVec2::from_angle(f64::from(k) * 0.7), DVec2::from_angle(f64::from(k) * 0.7 + 1.57));
-            assert_eq!(of(&|place| x.dot(place).abs() < 0.3).0, None, "strip {k}");
-            let corner = of(&|place| x.dot(place) > 0.0 && y.dot(place) > 0.0).0;
+            assert_eq!(of(&|at_px| x.dot(at_px).abs() < 0.3).0, None, "strip {k}");
+            let corner = of(&|at_px| x.dot(at_px) > 0.0 && y.dot(at_px) > 0.0).0;
             assert_eq!(corner, None, "corner {k}");
         }
         // Values that are not finite cause no panic.

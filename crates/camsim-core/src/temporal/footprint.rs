@@ -103,8 +103,8 @@ impl Footprint {
     /// Column and row of tap `i` (cyclic) in the grid.
     pub fn cell(&self, i: u32) -> [u32; 2] {
         let [nx, ny] = self.taps;
-        let place = tap_cell(self.taps, i % (nx * ny));
-        [place % nx, place / nx]
+        let cell = tap_cell(self.taps, i % (nx * ny));
+        [cell % nx, cell / nx]
     }
 
     /// Colour of tap `i` around a source.
@@ -160,9 +160,9 @@ fn tap_cell([nx, ny]: [u32; 2], turn: u32) -> u32 {
     let Some((_, turns)) = TAP_ORDERS.iter().find(|(grid, _)| *grid == [columns, rows]) else {
         return if turn % 2 == 1 { nx * ny - 1 - turn / 2 } else { turn / 2 };
     };
-    let place = (turns >> (4 * turn)) as u32 & 15;
+    let cell = (turns >> (4 * turn)) as u32 & 15;
     // The order of the transposed grid, for a grid with more rows than columns.
-    if nx >= ny { place } else { place % columns * nx + place / columns }
+    if nx >= ny { cell } else { cell % columns * nx + cell / columns }
 }
 
 /// Offsets of the taps of a grid, in the order in which they are read, as fractions of the grid's sides from its
@@ -173,7 +173,7 @@ pub fn tap_offsets(taps: [u32; 2]) -> Vec<[f32; 2]> {
     let fraction = |cell: u32, of: u32| (f64::from(cell) + 0.5) as f32 / of as f32 - 0.5;
     (0..nx * ny)
         .map(|turn| tap_cell([nx, ny], turn))
-        .map(|place| [fraction(place % nx, nx), fraction(place / nx, ny)])
+        .map(|cell| [fraction(cell % nx, nx), fraction(cell / nx, ny)])
         .collect()
 }
 
@@ -249,15 +249,15 @@ mod tests {
     fn tap_orders_visit_every_cell_and_stay_centred() {
         for [nx, ny] in (1..=6).flat_map(|nx| (1..=6).map(move |ny| [nx, ny])) {
             let count = nx * ny;
-            let places: Vec<u32> = (0..count).map(|turn| tap_cell([nx, ny], turn)).collect();
-            let mut sorted = places.clone();
+            let cells: Vec<u32> = (0..count).map(|turn| tap_cell([nx, ny], turn)).collect();
+            let mut sorted = cells.clone();
             sorted.sort_unstable();
             assert_eq!(sorted, (0..count).collect::<Vec<_>>(), "{nx} x {ny}");
             // In cells, summed over all taps; 1/n of it is the offset of n taps.
             let middle = 0.5 * DVec2::new(f64::from(nx - 1), f64::from(ny - 1));
             let mut sum = DVec2::ZERO;
-            for place in places {
-                sum += DVec2::new(f64::from(place % nx), f64::from(place / nx)) - middle;
+            for cell in cells {
+                sum += DVec2::new(f64::from(cell % nx), f64::from(cell / nx)) - middle;
                 let most = if nx.max(ny) <= 4 { 2.0 } else { middle.length() };
                 assert!(sum.length() <= most + 1e-9, "{nx} x {ny}: {sum}");
             }
@@ -269,8 +269,8 @@ mod tests {
         for [nx, ny] in TAP_ORDERS.iter().flat_map(|&([nx, ny], _)| [[nx, ny], [ny, nx]]) {
             let count = nx * ny;
             let cell = |turn: u32| {
-                let place = tap_cell([nx, ny], turn);
-                DVec2::new(f64::from(place % nx), f64::from(place / nx))
+                let cell = tap_cell([nx, ny], turn);
+                DVec2::new(f64::from(cell % nx), f64::from(cell / nx))
                     - 0.5 * DVec2::new(f64::from(nx - 1), f64::from(ny - 1))
             };
             let with_time = |of: &dyn Fn(DVec2) -> f64| {

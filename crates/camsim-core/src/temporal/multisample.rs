@@ -26,9 +26,9 @@ const ONE_SURFACE: f32 = 0.02;
 #[must_use]
 pub fn resolve_depth(all: [f32; 4], slopes: [f32; 2]) -> f32 {
     // Values extrapolated to the centre of the pixel.
-    let places = SAMPLE_POSITIONS.map(|place| place.as_vec2());
+    let positions = SAMPLE_POSITIONS.map(|position| position.as_vec2());
     let middle: [f32; 4] =
-        std::array::from_fn(|k| all[k] - slopes[0] * places[k].x - slopes[1] * places[k].y);
+        std::array::from_fn(|k| all[k] - slopes[0] * positions[k].x - slopes[1] * positions[k].y);
     let most = all.iter().fold(0.0_f32, |most, &of| most.max(of));
     let range = |of: &[f32; 4]| {
         of.iter().fold([f32::INFINITY, 0.0_f32], |[low, high], &of| [low.min(of), high.max(of)])
@@ -65,16 +65,17 @@ mod tests {
 
     /// Samples of a plane with inverse depth `middle` at the centre of the pixel and the given slopes.
     fn plane(middle: f32, slopes: [f32; 2]) -> [f32; 4] {
-        SAMPLE_POSITIONS.map(|place| middle + slopes[0] * place.x as f32 + slopes[1] * place.y as f32)
+        SAMPLE_POSITIONS
+            .map(|position| middle + slopes[0] * position.x as f32 + slopes[1] * position.y as f32)
     }
 
     #[test]
     fn sample_positions_are_centred_with_distinct_rows_and_columns() {
         assert_eq!(SAMPLE_POSITIONS.iter().sum::<DVec2>(), DVec2::ZERO);
         for along in [DVec2::X, DVec2::Y] {
-            let mut places = SAMPLE_POSITIONS.map(|place| place.dot(along));
-            places.sort_by(f64::total_cmp);
-            assert_eq!(places, [-0.375, -0.125, 0.125, 0.375]);
+            let mut positions = SAMPLE_POSITIONS.map(|position| position.dot(along));
+            positions.sort_by(f64::total_cmp);
+            assert_eq!(positions, [-0.375, -0.125, 0.125, 0.375]);
         }
     }
 

@@ -17,12 +17,12 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The polynomial through `places`; points after the fifth are ignored.
+    /// The polynomial through `points`; points after the fifth are ignored.
     #[must_use]
-    pub fn through(places: &[DVec2]) -> Self {
+    pub fn through(points: &[DVec2]) -> Self {
         let mut row = [DVec2::ZERO; MAX_POINTS];
-        let count = places.len().min(MAX_POINTS);
-        row[..count].copy_from_slice(&places[..count]);
+        let count = points.len().min(MAX_POINTS);
+        row[..count].copy_from_slice(&points[..count]);
         let mut differences = [row[0]; MAX_POINTS];
         for (order, difference) in differences.iter_mut().enumerate().skip(1) {
             for i in 0..count.saturating_sub(order) {
@@ -30,7 +30,7 @@ impl Curve {
             }
             *difference = if order < count { row[0] } else { DVec2::ZERO };
         }
-        Self { differences, length_px: places.windows(2).map(|pair| pair[0].distance(pair[1])).sum() }
+        Self { differences, length_px: points.windows(2).map(|pair| pair[0].distance(pair[1])).sum() }
     }
 
     /// Position after `steps` steps from the first point.
@@ -41,11 +41,11 @@ impl Curve {
     }
 }
 
-/// The polynomials through all of `places`, one after the other; `stage` sets the number of points of each.
-pub fn curves(places: &[DVec2], stage: PathStage) -> impl ExactSizeIterator<Item = Curve> + '_ {
+/// The polynomials through all of `points`, one after the other; `stage` sets the number of points of each.
+pub fn curves(points: &[DVec2], stage: PathStage) -> impl ExactSizeIterator<Item = Curve> + '_ {
     let steps = stage.steps() as usize;
-    (0..places.len().saturating_sub(1) / steps)
-        .map(move |k| Curve::through(&places[k * steps..=(k + 1) * steps]))
+    (0..points.len().saturating_sub(1) / steps)
+        .map(move |k| Curve::through(&points[k * steps..=(k + 1) * steps]))
 }
 
 #[cfg(test)]
@@ -57,8 +57,8 @@ mod tests {
         for steps in 1..MAX_POINTS {
             // A path of the same degree is reproduced everywhere.
             let path = |t: f64| DVec2::new(3.0 - t + 0.5 * t.powi(steps as i32), 2.0 * t);
-            let places: Vec<DVec2> = (0..=steps).map(|k| path(k as f64)).collect();
-            let curve = Curve::through(&places);
+            let points: Vec<DVec2> = (0..=steps).map(|k| path(k as f64)).collect();
+            let curve = Curve::through(&points);
             for t in [0.0, 0.3, 1.0, 0.5 * steps as f64, steps as f64] {
                 assert!(curve.at(t).distance(path(t)) < 1e-12, "{steps} steps, {t}");
             }
@@ -72,10 +72,10 @@ mod tests {
         for (stage, bound) in PathStage::ALL.into_iter().zip([1.0 / 8.0, 1.0 / 15.58, 1.0 / 33.0]) {
             for wh in [0.2_f64, 0.5, 1.0] {
                 let path = |t: f64| DVec2::new((wh * t + 0.4).sin(), 0.0);
-                let places: Vec<DVec2> = (0..=8).map(|k| path(f64::from(k))).collect();
+                let points: Vec<DVec2> = (0..=8).map(|k| path(f64::from(k))).collect();
                 let steps = f64::from(stage.steps());
                 let mut worst = 0.0_f64;
-                for (k, curve) in curves(&places, stage).enumerate() {
+                for (k, curve) in curves(&points, stage).enumerate() {
                     for i in 0..=100 {
                         let t = steps * f64::from(i) / 100.0;
                         worst = worst.max(curve.at(t).distance(path(k as f64 * steps + t)));

@@ -138,17 +138,17 @@ fn first_surface(
     let (rotation, shift) = key_from_row;
     let direction = rotation * uv.extend(1.0);
     let row_inverse_depth_of = |in_key: f64| in_key * direction.z / (1.0 - shift.z * in_key).max(1e-3);
-    let place = |w: f64| ideal.px_from_point(direction + w * shift);
+    let position = |w: f64| ideal.px_from_point(direction + w * shift);
     let inverse_depth = |position_px: DVec2| image.inverse_depth(position_px);
-    march(place, row_inverse_depth_of, nearest_w, inverse_depth, ideal)
+    march(position, row_inverse_depth_of, nearest_w, inverse_depth, ideal)
 }
 
-/// `first_surface` for any motion: `place(w)` is the projection of the ray's point at inverse depth w into
+/// `first_surface` for any motion: `position(w)` is the projection of the ray's point at inverse depth w into
 /// the ideal frame, `inverse_depth` the depth shown at a position there, and `row_inverse_depth_of` converts
 /// that to the row's camera.
 #[must_use]
 pub fn march(
-    place: impl Fn(f64) -> DVec2,
+    position: impl Fn(f64) -> DVec2,
     row_inverse_depth_of: impl Fn(f64) -> f64,
     nearest_w: f64,
     inverse_depth: impl Fn(DVec2) -> f64,
@@ -157,13 +157,13 @@ pub fn march(
     // Projection of the ray's point at `w`, and the surface shown there as an inverse depth in the row's
     // camera.
     let surface_at = |w: f64| {
-        let position_px = place(w);
+        let position_px = position(w);
         (position_px, row_inverse_depth_of(inverse_depth(position_px)))
     };
     // A bound for cameras that almost touch the nearest surface, where the march would not end.
     let w_near = row_inverse_depth_of(1.02 * nearest_w).min(4.0 * 1.02 * nearest_w);
     let (far_px, at_infinity) = surface_at(0.0);
-    let length_px = place(w_near).distance(far_px);
+    let length_px = position(w_near).distance(far_px);
     let px_per_w = length_px / w_near.max(1e-12);
     if length_px < GAP_PX {
         // No occlusion is possible: one iteration from infinity is enough.
@@ -252,8 +252,8 @@ pub fn mean_of_rays(
     color: impl Fn(DVec2, f64) -> Option<DVec3>,
 ) -> DVec3 {
     let of_ray = |i: u32| {
-        let (place, fraction) = subsample(i, count);
-        color(uv + place.x * d_dx + place.y * d_dy, fraction).unwrap_or(DVec3::ZERO)
+        let (position, fraction) = subsample(i, count);
+        color(uv + position.x * d_dx + position.y * d_dy, fraction).unwrap_or(DVec3::ZERO)
     };
     (0..count).map(of_ray).sum::<DVec3>() / f64::from(count.max(1))
 }
@@ -310,7 +310,7 @@ mod tests {
             (0..width * height).map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
         };
         let fine = corners(IDEAL.size_px.map(|side| side * scale)).flat_map(|corner| {
-            SupersampledImage::SAMPLE_POSITIONS.map(|place| (corner + place) / f64::from(scale) - 0.5)
+            SupersampledImage::SAMPLE_POSITIONS.map(|position| (corner + position) / f64::from(scale) - 0.5)
         });
         let samples: Vec<f64> = fine.map(|position_px| look(position_px).inverse_depth).collect();
         let centres: Vec<PixelCentre> = corners(IDEAL.size_px).map(&look).collect();
@@ -448,10 +448,10 @@ mod tests {
     #[test]
     fn subsamples_are_even_over_area_and_time() {
         for count in [16, 32, 64, 256] {
-            let places: Vec<_> = (0..count).map(|i| subsample(i, count)).collect();
+            let positions: Vec<_> = (0..count).map(|i| subsample(i, count)).collect();
             for of in [|p: &(DVec2, f64)| p.0.x + 0.5, |p: &(DVec2, f64)| p.0.y + 0.5, |p: &(DVec2, f64)| p.1]
             {
-                let mut values: Vec<f64> = places.iter().map(of).collect();
+                let mut values: Vec<f64> = positions.iter().map(of).collect();
                 values.sort_by(f64::total_cmp);
                 for (k, value) in values.iter().enumerate() {
                     let even = (k as f64 + 0.5) / f64::from(count);

@@ -141,9 +141,9 @@ mod tests {
         valid: impl Fn(usize, usize) -> bool,
         look: impl Fn(f32, f32) -> f32,
     ) -> Vec<[usize; 2]> {
-        let places = || (0..10).flat_map(|y| (0..12).map(move |x| [x, y]));
-        let inverse_depth: Vec<f32> = places().map(|[x, y]| look(x as f32, y as f32)).collect();
-        let valid: Vec<bool> = places().map(|[x, y]| valid(x, y)).collect();
+        let pixels = || (0..10).flat_map(|y| (0..12).map(move |x| [x, y]));
+        let inverse_depth: Vec<f32> = pixels().map(|[x, y]| look(x as f32, y as f32)).collect();
+        let valid: Vec<bool> = pixels().map(|[x, y]| valid(x, y)).collect();
         let grid = DepthGrid {
             width: 12,
             row_step,
@@ -151,7 +151,7 @@ mod tests {
             valid: &valid,
             displacement_px: 0.0,
         };
-        places().zip(grid.unreliable_pixels()).filter(|(_, suspect)| *suspect).map(|(at, _)| at).collect()
+        pixels().zip(grid.unreliable_pixels()).filter(|(_, suspect)| *suspect).map(|(at, _)| at).collect()
     }
 
     #[test]

@@ -91,7 +91,7 @@ impl Curve {
     }
 }
 
-/// Places of a reference: from an instant on, at equal steps, for a number of control ticks.
+/// Positions of a reference: from an instant on, at equal steps, for a number of control ticks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ticks {
     pub(crate) curve: Curve,

@@ -13,9 +13,9 @@ pub(super) fn check_motion(check: &mut Check, table: &str, model: &GltfSpec, mot
     check.require(!(has_path && motion.poses.is_some()), key("path"), || {
         "takes the place of poses: leave one of them out".into()
     });
-    let has_place =
+    let has_position =
         model.at != PatternCentre::Origin || model.geodetic.is_some() || model.placements.is_some();
-    check.require(!(is_carried && has_place), key(if has_path { "path" } else { "poses" }), || {
+    check.require(!(is_carried && has_position), key(if has_path { "path" } else { "poses" }), || {
         format!("takes the place of at, geodetic and placements of {table}: leave those out")
     });
     check.require(is_carried || motion.orient.is_none(), key("orient"), || {
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
     use crate::scenario::{LoopKind, SpinSpec};
 
-    /// What is said of a motion of a model at a place.
+    /// What is said of a motion of a model at a position.
     fn said(motion: MotionSpec, at: PatternCentre) -> Vec<String> {
         let model = GltfSpec {
             file: "a.glb".into(),

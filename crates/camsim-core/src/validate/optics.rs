@@ -9,8 +9,8 @@ use crate::{
 
 /// Scales of red and blue beyond this, or below its inverse, are typing errors.
 const MOST_SCALE: f64 = 1.25;
-/// Places between axis and corner at which a polynomial is checked.
-const PLACES: u32 = 64;
+/// Positions between axis and corner at which a polynomial is checked.
+const RADII: u32 = 64;
 
 pub(super) fn check_optics(check: &mut Check, camera: &CameraSpec) {
     if let Some(chromatic) = &camera.chromatic {
@@ -71,7 +71,7 @@ fn check_scale(check: &mut Check, camera: &CameraSpec, chromatic: &ChromaticSpec
         let factor = v + c * r + b * r * r;
         (1.0 / MOST_SCALE..=MOST_SCALE).contains(&factor)
     };
-    check.require((0..=PLACES).all(|i| is_near(most * f64::from(i) / f64::from(PLACES))), &key, || {
+    check.require((0..=RADII).all(|i| is_near(most * f64::from(i) / f64::from(RADII))), &key, || {
         format!(
             "is the factor v + c r + b r^2 on the distance from the principal point, near 1 all over the picture (r = 0 \
              to {most:.2}), not {given:?}; [1.0005] makes this colour's image larger by 0.05 %"
@@ -140,8 +140,8 @@ fn check_vignetting(check: &mut Check, camera: &CameraSpec, spec: &VignettingSpe
                 terms.len()
             )
         });
-        let places = (0..=PLACES).map(|i| most * f64::from(i) / f64::from(PLACES));
-        let dark = places.into_iter().find(|r| polynomial(terms, r * r) < 0.0);
+        let radii = (0..=RADII).map(|i| most * f64::from(i) / f64::from(RADII));
+        let dark = radii.into_iter().find(|r| polynomial(terms, r * r) < 0.0);
         check.require(dark.is_none(), key(leaf), || {
             format!(
                 "makes 1 + k1 r^2 + k2 r^4 + k3 r^6 negative at r = {:.2}; r is 1 at half the picture's diagonal, and \

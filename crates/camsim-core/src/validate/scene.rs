@@ -15,7 +15,7 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
     });
     for (i, model) in scene.gltf.iter().enumerate() {
         let table = format!("scene.gltf.{i}");
-        check_place(check, &table, model.at, model.geodetic);
+        check_position(check, &table, model.at, model.geodetic);
         check_name(check, &table, &model.name);
         check.require(
             model.classes.is_empty() || model.objects != ObjectsOf::Placement,
@@ -71,7 +71,7 @@ fn check_board(check: &mut Check, board: &BoardSpec) {
             "takes the place of kind, columns, rows and size_m: leave those out".into()
         });
     }
-    check_place(check, "scene.board", board.at, board.geodetic);
+    check_position(check, "scene.board", board.at, board.geodetic);
 }
 
 /// Name of an object.
@@ -82,7 +82,7 @@ fn check_name(check: &mut Check, table: &str, name: &Option<String>) {
 }
 
 /// Placement of an object: in local north-east-down or geodetic, not both.
-fn check_place(check: &mut Check, table: &str, at: PatternCentre, geodetic: Option<[f64; 3]>) {
+fn check_position(check: &mut Check, table: &str, at: PatternCentre, geodetic: Option<[f64; 3]>) {
     if let Some([lat_deg, lon_deg, height_m]) = geodetic {
         let key = format!("{table}.geodetic");
         let ok = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 360.0 && height_m.is_finite();

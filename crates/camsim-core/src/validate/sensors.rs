@@ -17,8 +17,8 @@ pub(super) fn check_sensors(check: &mut Check, scenario: &Scenario) {
 fn check_names(check: &mut Check, scenario: &Scenario) {
     let all: Vec<(&str, &str)> = scenario.sensor_names().collect();
     for (i, (kind, name)) in all.iter().enumerate() {
-        let place = all[..i].iter().filter(|(other, _)| other == kind).count();
-        let key = format!("{kind}.{place}.name");
+        let index = all[..i].iter().filter(|(other, _)| other == kind).count();
+        let key = format!("{kind}.{index}.name");
         check.require(names::is_portable(name), key.as_str(), || {
             format!("is the name of files: {}, such as \"{kind}0\", not \"{name}\"", names::ADVICE)
         });

@@ -212,8 +212,8 @@ impl<'a> FrameCaster<'a> {
             for (x, depths) in depths.iter_mut().enumerate() {
                 let middle_px = DVec2::new(x as f64, y as f64);
                 *depths = known(y * width + x).unwrap_or_else(|| {
-                    SAMPLE_POSITIONS.map(|place| {
-                        self.trace(middle_px + place, hits);
+                    SAMPLE_POSITIONS.map(|position| {
+                        self.trace(middle_px + position, hits);
                         self.inverse_depth(hits)
                     })
                 });
@@ -270,7 +270,7 @@ impl<'a> FrameCaster<'a> {
     }
 
     /// Linear R G B and inverse depths (1/m) of a pixel's samples, and what light they see. Each triangle is
-    /// shaded once: at the mean place of the samples that show it where its texture ends with it, else at the
+    /// shaded once: at the mean position of the samples that show it where its texture ends with it, else at the
     /// pixel's middle; with the mean of their fractions of the sun, or that from `suns`.
     fn pixel_samples(
         &self,
@@ -281,9 +281,9 @@ impl<'a> FrameCaster<'a> {
         let PixelScratch { hits, fractions } = scratch;
         fractions.clear();
         let (mut opaque, mut seen) = ([None; SAMPLES], SeenLight::default());
-        for (k, (hits, place)) in hits.iter_mut().zip(SAMPLE_POSITIONS).enumerate() {
-            self.trace(middle_px + place, hits);
-            let ray = self.shader.camera.ray(middle_px + place);
+        for (k, (hits, position)) in hits.iter_mut().zip(SAMPLE_POSITIONS).enumerate() {
+            self.trace(middle_px + position, hits);
+            let ray = self.shader.camera.ray(middle_px + position);
             opaque[k] = self.opaque_triangle(hits, &ray);
             let first = opaque[k].zip(hits.opaque).map(|(triangle, hit)| (triangle, hit.t()));
             for (triangle, t) in hits.blended.iter().map(|hit| (hit.triangle(), hit.t)).chain(first) {
@@ -323,8 +323,9 @@ impl<'a> FrameCaster<'a> {
     }
 
     fn fraction_color(&self, fraction: &TriangleFraction, middle_px: DVec2) -> Option<glam::Vec4> {
-        let places = (0..SAMPLES).filter(|k| fraction.samples & (1 << k) != 0).map(|k| SAMPLE_POSITIONS[k]);
-        let mean = places.clone().sum::<DVec2>() / f64::from(fraction.samples.count_ones());
+        let positions =
+            (0..SAMPLES).filter(|k| fraction.samples & (1 << k) != 0).map(|k| SAMPLE_POSITIONS[k]);
+        let mean = positions.clone().sum::<DVec2>() / f64::from(fraction.samples.count_ones());
         let mesh = fraction.triangle.surface.checked_sub(1).map(|i| &self.shader.scene.meshes[i as usize]);
         // The ground, and a picture with holes, go on beyond a triangle.
         let ends = mesh.is_some_and(|mesh| mesh.material.blends || mesh.material.cutoff.is_none());
@@ -333,7 +334,9 @@ impl<'a> FrameCaster<'a> {
         let sun = fraction.sun / f64::from(fraction.samples.count_ones());
         let color = self.shader.color(&fraction.triangle, shading_px, sun);
         color.or_else(|| {
-            places.clone().find_map(|place| self.shader.color(&fraction.triangle, middle_px + place, sun))
+            positions
+                .clone()
+                .find_map(|position| self.shader.color(&fraction.triangle, middle_px + position, sun))
         })
     }
 }
@@ -366,7 +369,7 @@ fn near_edges(size_px: [u32; 2], inverse_depth: &[f32]) -> Vec<bool> {
         |i: usize| edge_mask::is_edge([(i % width) as i64, (i / width) as i64], size_px, 1, middle, None);
     let marked: Vec<bool> = (0..width * height).into_par_iter().map(is_marked).collect();
     let window =
-        |place: usize, length: usize| place.saturating_sub(READ_PX)..(place + READ_PX + 1).min(length);
+        |index: usize, length: usize| index.saturating_sub(READ_PX)..(index + READ_PX + 1).min(length);
     let in_row = |i: usize| window(i % width, width).any(|x| marked[i / width * width + x]);
     let rows: Vec<bool> = (0..width * height).into_par_iter().map(in_row).collect();
     let in_column = |i: usize| window(i / width, height).any(|y| rows[y * width + i % width]);

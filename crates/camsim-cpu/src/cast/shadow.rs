@@ -184,10 +184,10 @@ impl FrameCaster<'_> {
 
 /// Positions spread evenly over a pixel: a Fibonacci lattice.
 pub(super) fn lattice(middle_px: DVec2, count: u32) -> impl Iterator<Item = DVec2> {
-    let place = move |k: u32| {
+    let position = move |k: u32| {
         DVec2::new((f64::from(k) + 0.5) / f64::from(count), (f64::from(k) * GOLDEN).fract()) - 0.5
     };
-    (0..count).map(move |k| middle_px + place(k))
+    (0..count).map(move |k| middle_px + position(k))
 }
 
 /// Whether both light and shadow are seen in a pixel or its neighbours.

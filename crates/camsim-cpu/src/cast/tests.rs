@@ -127,9 +127,9 @@ fn minified_textures_are_means_over_the_pixels_area() {
     let ([mut errors, mut biases], mut unfiltered, mut count) = ([[0.0; 4]; 2], 0.0, 0.0);
     for (i, position_px) in pixels().filter(|(i, _)| i % 11 == 0) {
         let light = |offset_px: DVec2| oracle.radiance(&key.pose, ray_uv(&plan, position_px + offset_px));
-        let place = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
-        let places = (0..SIDE * SIDE).map(|k| DVec2::new(place(k % SIDE), place(k / SIDE)));
-        let mean = places.map(light).sum::<DVec3>() / f64::from(SIDE * SIDE);
+        let position = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
+        let positions = (0..SIDE * SIDE).map(|k| DVec2::new(position(k % SIDE), position(k / SIDE)));
+        let mean = positions.map(light).sum::<DVec3>() / f64::from(SIDE * SIDE);
         for (k, image) in images.iter().enumerate() {
             let error = color_at(image, i) - mean;
             errors[k] += error.length_squared() / 3.0;
@@ -173,9 +173,9 @@ fn minified_panes_are_means_of_colors_weighted_by_alpha() {
     let (mut error, mut bias, mut unfiltered, mut count) = (0.0, DVec3::ZERO, 0.0, 0.0);
     for (i, position_px) in pixels().filter(|(i, _)| i % 7 == 0) {
         let light = |offset_px: DVec2| oracle.radiance(&key.pose, ray_uv(&plan, position_px + offset_px));
-        let place = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
-        let places = (0..SIDE * SIDE).map(|k| DVec2::new(place(k % SIDE), place(k / SIDE)));
-        let mean = places.map(light).sum::<DVec3>() / f64::from(SIDE * SIDE);
+        let position = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
+        let positions = (0..SIDE * SIDE).map(|k| DVec2::new(position(k % SIDE), position(k / SIDE)));
+        let mean = positions.map(light).sum::<DVec3>() / f64::from(SIDE * SIDE);
         error += (color_at(&image, i) - mean).length_squared() / 3.0;
         bias += color_at(&image, i) - mean;
         unfiltered += (light(DVec2::ZERO) - mean).length_squared() / 3.0;
@@ -271,7 +271,7 @@ fn samples_of_an_edge_are_on_its_sides() {
     let image = cast.draw(&plan, &key);
     let mut mixed = 0;
     for (i, position_px) in pixels() {
-        let covered = SAMPLE_POSITIONS.iter().filter(|place| side(position_px + **place) > 0.0).count();
+        let covered = SAMPLE_POSITIONS.iter().filter(|position| side(position_px + **position) > 0.0).count();
         let expected = covered as f64 / 4.0;
         assert!((color_at(&image, i) - expected).abs().max_element() < 1e-6, "{position_px}: {covered}");
         let depth_m = if covered > 1 { 10.0 } else { 20.0 };
@@ -343,7 +343,7 @@ fn marks_are_those_of_the_edge_and_all_depths_near_them_are_cast() {
     // Thin surfaces: a pixel whose samples alone pass the edge is marked too.
     let thin = edge_mask(SIZE_PX, 1, &centres, &samples(&all));
     let covered = |i: usize, position_px: DVec2| {
-        let count = SAMPLE_POSITIONS.iter().filter(|place| side(position_px + **place) > 0.0).count();
+        let count = SAMPLE_POSITIONS.iter().filter(|position| side(position_px + **position) > 0.0).count();
         expected[i] || count % 4 != 0
     };
     for (i, position_px) in pixels() {

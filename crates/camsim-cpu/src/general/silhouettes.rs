@@ -228,7 +228,7 @@ fn reaches(
             let position = tile / step % length;
             let first = position.saturating_sub(reach_tiles);
             let last = position.saturating_add(reach_tiles).min(length - 1);
-            let tile_at = |place: usize| tiles[tile + place * step - position * step];
+            let tile_at = |at: usize| tiles[tile + at * step - position * step];
             (first..=last).map(tile_at).fold(Reach::default(), Reach::joined)
         };
         tiles = (0..across * down).map(joined).collect();

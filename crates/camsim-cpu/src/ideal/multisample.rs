@@ -259,9 +259,9 @@ impl BandSamples {
                 sky += 0.25;
             } else if !visible[..k].contains(&id) {
                 let (mut count, mut offset_sum) = (0.0, [0.0; 2]);
-                for (place, _) in SAMPLE_POSITIONS.iter().zip(visible).filter(|(_, other)| **other == id) {
+                for (position, _) in SAMPLE_POSITIONS.iter().zip(visible).filter(|(_, other)| **other == id) {
                     count += 1.0;
-                    offset_sum = [offset_sum[0] + place.x as f32, offset_sum[1] + place.y as f32];
+                    offset_sum = [offset_sum[0] + position.x as f32, offset_sum[1] + position.y as f32];
                 }
                 let scale = SAMPLES_PER_SIDE as f32 / count;
                 let centroid_px = [scale.mul_add(offset_sum[0], x), scale.mul_add(offset_sum[1], y)];

@@ -235,9 +235,9 @@ mod tests {
                 *clamped = 0.01 + 1e-5 * (i % stride) as f32;
             }
             for k in (0..stride * height).step_by(step) {
-                let [place, ..] = pcg4d([k as u32, 1, 2, 3]);
-                let place = place as usize % (stride * height);
-                depth[place] *= 1.5;
+                let [texel, ..] = pcg4d([k as u32, 1, 2, 3]);
+                let texel = texel as usize % (stride * height);
+                depth[texel] *= 1.5;
             }
             let mut tiles = SampledTiles::default();
             tiles.clear(size_px);

@@ -84,17 +84,17 @@ fn covered_by<P: SamplePattern>(
 }
 
 /// A plane of `cells` x `cells` cells of two triangles, whose inner vertices are jittered by a fifth of a
-/// cell, mapped by `place` from positions in 0..=1.
-fn sheet(cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Vertex<2>; 3]> {
-    sheet_by(&camera(), cells, place)
+/// cell, mapped by `position` from positions in 0..=1.
+fn sheet(cells: u32, position: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Vertex<2>; 3]> {
+    sheet_by(&camera(), cells, position)
 }
 
-fn sheet_by(camera: &Camera, cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Vertex<2>; 3]> {
+fn sheet_by(camera: &Camera, cells: u32, position: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Vertex<2>; 3]> {
     let corner = |x: u32, y: u32| {
         let [across, down, ..] = random(x * 1000 + y);
         let shake = |side: u32, by: f32| if side == 0 || side == cells { 0.0 } else { 0.4 * (by - 0.5) };
         let at = [(x as f32 + shake(x, across)) / cells as f32, (y as f32 + shake(y, down)) / cells as f32];
-        camera.project(camera.in_camera_m(place(at)), at)
+        camera.project(camera.in_camera_m(position(at)), at)
     };
     let pair = |x: u32, y: u32| {
         let [a, b, c, d] = [corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)];
@@ -122,7 +122,7 @@ fn walls() -> [Wall; 6] {
 
 fn assert_covered_once(name: &str, counts: &[u32]) {
     let other = counts.iter().filter(|&&count| count != 1).count();
-    assert_eq!(other, 0, "{name}: of {} places", counts.len());
+    assert_eq!(other, 0, "{name}: of {} positions", counts.len());
 }
 
 /// Mesh triangles that cover no position are dropped: the others cover the same positions.
@@ -227,11 +227,11 @@ fn covered_exactly<P: SamplePattern>(positions: P, sample_offset: i32, reach_m: 
         for (i, &count) in counts.iter().enumerate() {
             let [column, row] = [i % columns, i / columns];
             let [right, down] = P::sample_offset(column, row);
-            let at = |place: usize, quarters: i32| {
-                (P::STEP * place) as i64 * i64::from(SUBPIXELS) + i64::from(quarters * SUBPIXELS / 4)
+            let at = |pixel: usize, quarters: i32| {
+                (P::STEP * pixel) as i64 * i64::from(SUBPIXELS) + i64::from(quarters * SUBPIXELS / 4)
             };
             let (is_inside, is_on_border) = inside(at(column, right), at(row, down));
-            assert!(is_on_border || (count == 1) == is_inside, "triangle {k}, place {i}");
+            assert!(is_on_border || (count == 1) == is_inside, "triangle {k}, position {i}");
             all += count;
         }
     }

@@ -43,9 +43,9 @@ pub(super) fn photometric(
 fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channels: usize) -> [Lanes; 3] {
     let mut bits = [[0_u32; LANES]; 3];
     for i in 0..LANES {
-        let place = (x + i as u32) | (y << 16);
+        let pixel = (x + i as u32) | (y << 16);
         let words = pcg4d([
-            place,
+            pixel,
             frame.frame_number,
             frame.seed[0],
             frame.seed[1] ^ NOISE_STREAM.wrapping_mul(0x9e37_79b9),
@@ -65,19 +65,19 @@ fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channel
 /// exponent and the segment part of its mantissa.
 #[inline(always)]
 fn normals_from_bits(bits: &[u32; LANES], segments: &[[f32; 2]]) -> Lanes {
-    let mut place = [0_u32; LANES];
+    let mut segment = [0_u32; LANES];
     let mut t = ZERO;
     for i in 0..LANES {
         // Odd and below 2^24, so exact.
         let tail = (((bits[i] >> 7) & 0x00ff_fffe) + 1) as i32 as f32;
         let number = tail.to_bits();
         let octave = 23 + 127 - (number >> 23);
-        place[i] = octave * SEGMENTS as u32 + ((number >> 19) & 15);
+        segment[i] = octave * SEGMENTS as u32 + ((number >> 19) & 15);
         t[i] = (number & 0x0007_ffff) as i32 as f32 * (1.0 / 524_288.0);
     }
     let (mut begin, mut adds) = (ZERO, ZERO);
     for i in 0..LANES {
-        [begin[i], adds[i]] = segments[place[i] as usize];
+        [begin[i], adds[i]] = segments[segment[i] as usize];
     }
     per_lane(|i| {
         let value = begin[i] + t[i] * adds[i];

@@ -127,16 +127,16 @@ fn central_differences(size_px: [u32; 2], map: &LensMap, [x, y]: [u32; 2], sides
 
 /// One-sided or central difference of the map along an axis, over valid texels only.
 fn difference(size_px: [u32; 2], map: &LensMap, pixel: [u32; 2], axis: usize) -> [f32; 2] {
-    let at = |place: u32| {
+    let at = |index: u32| {
         let mut pixel = pixel;
-        pixel[axis] = place;
+        pixel[axis] = index;
         Some(map.uv[(pixel[1] * size_px[0] + pixel[0]) as usize]).filter(|uv| uv[0] < INVALID_ABOVE)
     };
-    let place = pixel[axis];
-    let after = (place + 1 < size_px[axis]).then(|| at(place + 1)).flatten();
-    let before = place.checked_sub(1).and_then(at);
+    let index = pixel[axis];
+    let after = (index + 1 < size_px[axis]).then(|| at(index + 1)).flatten();
+    let before = index.checked_sub(1).and_then(at);
     let minus = |a: [f32; 2], b: [f32; 2], factor: f32| [factor * (a[0] - b[0]), factor * (a[1] - b[1])];
-    match (before, at(place), after) {
+    match (before, at(index), after) {
         (Some(before), Some(_), Some(after)) => minus(after, before, 0.5),
         (None, Some(here), Some(after)) => minus(after, here, 1.0),
         (Some(before), Some(here), None) => minus(here, before, 1.0),

@@ -143,14 +143,14 @@ impl Stages<'_> {
         let key_inverse_depth = per_lane(key_inverse_depth);
         let scale = per_lane(|i| key_inverse_depth[i].mul_add(-shift[2], 1.0));
         let per_z = per_lane(|i| 1.0 / direction.z[i]);
-        let place =
+        let shifted =
             |far: f32, scale: f32, moved: f32| if scale > 1e-3 { scale.mul_add(far, moved) } else { far };
         let position_px = Lanes2 {
             x: per_lane(|i| {
-                place(direction.x[i] * per_z[i], scale[i], key_inverse_depth[i] * shift[0]).mul_add(fx, cx)
+                shifted(direction.x[i] * per_z[i], scale[i], key_inverse_depth[i] * shift[0]).mul_add(fx, cx)
             }),
             y: per_lane(|i| {
-                place(direction.y[i] * per_z[i], scale[i], key_inverse_depth[i] * shift[1]).mul_add(fy, cy)
+                shifted(direction.y[i] * per_z[i], scale[i], key_inverse_depth[i] * shift[1]).mul_add(fy, cy)
             }),
         };
         BlockSources { inside: self.inside(&position_px, &direction.z), position_px }

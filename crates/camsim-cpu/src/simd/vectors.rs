@@ -82,7 +82,7 @@ impl Coverage<'_> {
 }
 
 impl Vectors for Baseline {
-    /// Shifts exponent and mantissa to their places in a float and corrects the exponent bias by a factor.
+    /// Shifts exponent and mantissa to their positions in a float and corrects the exponent bias by a factor.
     #[inline(always)]
     fn floats_from_halves(self, halves: [u16; 8]) -> FloatVector {
         const FACTOR: f32 = f32::from_bits((127 + 112) << 23);
@@ -149,14 +149,14 @@ mod x86 {
     fn outside_mask(_: Avx2, triangle: &Coverage<'_>) -> __m256 {
         let [(a, of_a), (b, of_b), (c, of_c)] = triangle.edges;
         let [of_a, of_b, of_c]: [__m256i; 3] = [of_a, of_b, of_c].map(|of| bytemuck::cast(*of));
-        let places: __m256i = bytemuck::cast(LANE_INDICES);
+        let lanes: __m256i = bytemuck::cast(LANE_INDICES);
         // SAFETY: a value of `Avx2` tells that this processor has it.
         unsafe {
             let sum = |all: i32, per_lane: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), per_lane);
             let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
             _mm256_castsi256_ps(_mm256_or_si256(
                 beside,
-                _mm256_sub_epi32(_mm256_set1_epi32(triangle.last), places),
+                _mm256_sub_epi32(_mm256_set1_epi32(triangle.last), lanes),
             ))
         }
     }

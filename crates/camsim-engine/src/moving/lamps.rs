@@ -193,7 +193,7 @@ impl<'a> Job<'a> {
         Self { caster, plan, line, instants, spheres }
     }
 
-    /// Mean light over the area and exposure of a pixel, whose place along the row is stated; `None` if no lamp comes
+    /// Mean light over the area and exposure of a pixel, whose position along the row is stated; `None` if no lamp comes
     /// near.
     fn light(&self, along: u32, pixel: [u32; 2], scratch: &mut RayScratch) -> Option<Vec3> {
         let camera = &self.plan.camera;
@@ -216,10 +216,10 @@ impl<'a> Job<'a> {
         for k in near {
             let shift = shift(k);
             for i in (k * rays).div_ceil(count)..((k + 1) * rays).div_ceil(count) {
-                let place = PLACES[i] + shift;
-                let place = place - (place + 0.5).floor();
-                if within(k, uv + uv_from_px * place, 0.0) {
-                    of_lamps += pixel.cast(k, place);
+                let position = POSITIONS[i] + shift;
+                let position = position - (position + 0.5).floor();
+                if within(k, uv + uv_from_px * position, 0.0) {
+                    of_lamps += pixel.cast(k, position);
                     passing += 1;
                 }
             }
@@ -243,13 +243,13 @@ struct Pixel<'a> {
 }
 
 impl Pixel<'_> {
-    /// Linear R G B at an instant and a place in the pixel.
-    fn cast(&mut self, k: usize, place: DVec2) -> Vec3 {
+    /// Linear R G B at an instant and a position in the pixel.
+    fn cast(&mut self, k: usize, position: DVec2) -> Vec3 {
         // Each ray stands for its part of the pixel's area.
         let sides = DVec2::new(self.uv_from_px.row(0).length(), self.uv_from_px.row(1).length());
         let step_uv = sides / f64::from(RAYS).sqrt();
         let Job { caster, plan, instants, .. } = self.job;
-        let uv = self.uv + self.uv_from_px * place;
+        let uv = self.uv + self.uv_from_px * position;
         caster.color(&instants[k], uv, step_uv, plan.surface_reads, self.scratch)
     }
 
@@ -259,10 +259,10 @@ impl Pixel<'_> {
             let count = self.job.instants.len();
             let (mut sum, mut low, mut high) = (Vec3::ZERO, Vec3::INFINITY, Vec3::NEG_INFINITY);
             let mut cast = 0_u32;
-            for (place, phase) in rays {
+            for (position, phase) in rays {
                 let k = (((phase + 0.5) * count as f64) as usize).min(count - 1);
-                if is_beside(k, self.uv + self.uv_from_px * place) {
-                    let color = self.cast(k, place);
+                if is_beside(k, self.uv + self.uv_from_px * position) {
+                    let color = self.cast(k, position);
                     (sum, low, high) = (sum + color, low.min(color), high.max(color));
                     cast += 1;
                 }
@@ -270,7 +270,7 @@ impl Pixel<'_> {
             (sum / cast.max(1) as f32, (high - low).max_element(), cast)
         };
         let phase = |i: u32| f64::from(11 * i % FIRST_RAYS) / f64::from(FIRST_RAYS) - 0.5;
-        let first = &mut (0..FIRST_RAYS).map(|i| (PLACES[i as usize], phase(i)));
+        let first = &mut (0..FIRST_RAYS).map(|i| (POSITIONS[i as usize], phase(i)));
         let (color, spread, cast) = mean(first);
         if cast >= FIRST_BESIDE && spread < ALIKE {
             return Some(color);
@@ -295,18 +295,18 @@ fn room_px(plan: &FramePlan) -> f64 {
     IDEAL_ROOM_PX / plan.ideal.scale(&plan.camera).max(LEAST_SCALE)
 }
 
-/// What the places of an instant are shifted by, so that a lamp's steps from instant to instant do not beat with them.
+/// What the positions of an instant are shifted by, so that a lamp's steps from instant to instant do not beat with them.
 fn shift(instant: usize) -> DVec2 {
     let [x, y, ..] = pcg4d([instant as u32, 0, 0, 0]);
     DVec2::new(f64::from(x >> 8), f64::from(y >> 8)) / 2.0_f64.powi(24)
 }
 
-/// [`place`] of every ray.
-static PLACES: LazyLock<Vec<DVec2>> = LazyLock::new(|| (0..MOST_RAYS).map(place).collect());
+/// [`position`] of every ray.
+static POSITIONS: LazyLock<Vec<DVec2>> = LazyLock::new(|| (0..MOST_RAYS).map(position).collect());
 
-/// Place of ray i in its pixel, -0.5 to 0.5: the first two coordinates of Sobol's sequence. Any 2^k consecutive
+/// Position of ray i in its pixel, -0.5 to 0.5: the first two coordinates of Sobol's sequence. Any 2^k consecutive
 /// ones from a multiple of it are a net: every box with sides of 2^-a and 2^-b, a + b = k, has one.
-fn place(i: u32) -> DVec2 {
+fn position(i: u32) -> DVec2 {
     let mut direction = 1_u32 << 31;
     let mut second = 0;
     for bit in 0..u32::BITS - i.leading_zeros() {
@@ -324,15 +324,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_nets() {
+    fn positions_are_nets() {
         for (begin, log_count) in [(0_u32, 4_u32), (16, 4), (48, 4), (256, 8), (0, 12)] {
             for a in 0..=log_count {
                 let sides = [1_u32 << a, 1 << (log_count - a)];
                 let mut boxes = vec![0; 1 << log_count];
                 for i in begin..begin + (1 << log_count) {
-                    let place = place(i) + 0.5;
+                    let position = position(i) + 0.5;
                     let cell = |at: f64, side: u32| (at * f64::from(side)) as usize;
-                    boxes[cell(place.x, sides[0]) * sides[1] as usize + cell(place.y, sides[1])] += 1;
+                    boxes[cell(position.x, sides[0]) * sides[1] as usize + cell(position.y, sides[1])] += 1;
                 }
                 assert!(boxes.iter().all(|&count| count == 1), "{begin} {log_count} {a}");
             }

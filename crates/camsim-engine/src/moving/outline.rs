@@ -70,7 +70,7 @@ pub(super) struct Swept {
     pub ways_ned_m: Vec<[DVec3; 2]>,
     /// Room around its projected corners, pixels.
     room_px: f64,
-    /// First and last place across the rows of the readout at which it may be, pixels.
+    /// First and last position across the rows of the readout at which it may be, pixels.
     across_px: [f64; 2],
 }
 

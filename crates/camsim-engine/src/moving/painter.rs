@@ -1,4 +1,4 @@
-//! Colours by rays in place of a renderer's.
+//! Colours by rays instead of a renderer's.
 
 use std::sync::{Arc, OnceLock};
 
@@ -51,9 +51,9 @@ impl Painter {
         let Sequence { path, scenario, .. } = &*self.sequence;
         let instants: Vec<(DVec2, Instant)> = (0..RAYS)
             .map(ray)
-            .map(|(place, phase)| {
+            .map(|(position, phase)| {
                 let t_s = mid_s + phase * plan.shutter.exposure_pixel_s(x, y);
-                (place, caster.at(t_s, path.pose(t_s)))
+                (position, caster.at(t_s, path.pose(t_s)))
             })
             .collect();
         let stage = Photometry::new(&scenario.camera, plan.exposure.as_ref());
@@ -103,8 +103,8 @@ fn mean_color(
     // Each ray stands for its part of the pixel's area.
     let fraction = f64::from(instants.len() as u32).sqrt().recip();
     let step_uv = fraction * DVec2::new(uv_from_px.row(0).length(), uv_from_px.row(1).length());
-    let ray = |(place, instant): &(DVec2, Instant)| {
-        caster.color(instant, uv + uv_from_px * *place, step_uv, plan.surface_reads, scratch)
+    let ray = |(position, instant): &(DVec2, Instant)| {
+        caster.color(instant, uv + uv_from_px * *position, step_uv, plan.surface_reads, scratch)
     };
     Some(instants.iter().map(ray).sum::<Vec3>() / instants.len() as f32)
 }

@@ -21,17 +21,17 @@ const PHASES: i32 = 8;
 /// Longest reach, pixels. Beyond it a picture is all blur.
 const MOST_REACH_PX: f64 = 256.0;
 
-/// Place of ray i in its pixel and phase, each -0.5 to 0.5: the Hammersley set with the first two coordinates of
+/// Position of ray i in its pixel and phase, each -0.5 to 0.5: the Hammersley set with the first two coordinates of
 /// Sobol's sequence, a (0, 6, 3) net in base 2. Every box with sides of 2^-a, 2^-b and 2^-c, a + b + c = 6,
 /// has one ray. For a straight border that crosses the pixel at any speed the error of a coverage is 0.015 RMS
 /// and 0.1 at most.
 pub(crate) fn ray(i: u32) -> (DVec2, f64) {
     let unit = |bits: u32| (f64::from(bits) + 0.5) / f64::from(RAYS) - 0.5;
-    let place = DVec2::new(unit(i), unit(i.reverse_bits() >> 26));
+    let position = DVec2::new(unit(i), unit(i.reverse_bits() >> 26));
     // Direction numbers of the Sobol sequence for the polynomial x + 1, of 6 bits.
     let direction = [32_u32, 48, 40, 60, 34, 51];
     let phase = (0..6).filter(|bit| i >> bit & 1 == 1).fold(0, |sum, bit: usize| sum ^ direction[bit]);
-    (place, unit(phase))
+    (position, unit(phase))
 }
 
 /// Coverage of every pixel; 0 without a ray.
@@ -44,8 +44,8 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
         let Some(i) = index(pixels, pixel.position.map(i64::from)).filter(|&i| near[i]) else { return 1.0 };
         let from_px = DVec2::from_array(pixel.position.map(f64::from));
         let (mut same, mut all) = (0_u32, 0_u32);
-        for ((place, _), (t_s, pose)) in rays.iter().zip(cameras.of(pixel.position)) {
-            let Some(uv) = pixels.plan.camera.unproject(from_px + *place) else { continue };
+        for ((position, _), (t_s, pose)) in rays.iter().zip(cameras.of(pixel.position)) {
+            let Some(uv) = pixels.plan.camera.unproject(from_px + *position) else { continue };
             all += 1;
             same += u32::from(Some(object_of(pixels, pixels.rays.surface(*t_s, pose, uv))) == objects[i]);
         }

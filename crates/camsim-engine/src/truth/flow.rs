@@ -64,15 +64,15 @@ impl Landing<'_> {
         Some((px - from_px, state))
     }
 
-    /// Where the picture shows the point; of several places the nearest at which nothing is in front of it.
+    /// Where the picture shows the point; of several positions the nearest at which nothing is in front of it.
     fn find_all(&self, point: WorldPoint<'_>, from_px: DVec2) -> Option<(DVec2, FlowState)> {
         let target = self.projector.frame();
-        let mut places = target.find_all(point);
-        places.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
-        let Some(nearest) = places.first() else {
+        let mut found = target.find_all(point);
+        found.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+        let Some(nearest) = found.first() else {
             return target.outside(point, from_px).map(|px| (px, FlowState::Outside));
         };
-        let mut seen = places.iter().filter(|place| !self.is_hidden(point, &Shown::from(**place)));
+        let mut seen = found.iter().filter(|shown| !self.is_hidden(point, &Shown::from(**shown)));
         Some(match (seen.next(), seen.next()) {
             (None, _) => (nearest.px, FlowState::Occluded),
             (Some(only), None) => (only.px, FlowState::Visible),
@@ -80,12 +80,12 @@ impl Landing<'_> {
         })
     }
 
-    fn is_hidden(&self, point: WorldPoint<'_>, place: &Shown) -> bool {
+    fn is_hidden(&self, point: WorldPoint<'_>, shown: &Shown) -> bool {
         let rays = self.pixels.rays;
         if !self.is_in_doubt && !rays.has_models() {
             return false;
         }
-        let Shown { t_s, position_ned_m, depth_m, .. } = *place;
+        let Shown { t_s, position_ned_m, depth_m, .. } = *shown;
         let ray_ned = match point {
             WorldPoint::Towards(direction_ned) => Some(direction_ned),
             _ => point.position_ned_m(t_s).map(|now_ned_m| (now_ned_m - position_ned_m) / depth_m),

@@ -59,7 +59,7 @@ pub fn texel(texture: &Texture, uv: [f64; 2]) -> DVec3 {
     load(0.0, 0.0).lerp(load(1.0, 0.0), t.x).lerp(load(0.0, 1.0).lerp(load(1.0, 1.0), t.x), t.y)
 }
 
-/// The ray of a place on the sensor at an exposure phase in [-0.5, 0.5]; lines keep their own time all over
+/// The ray of a position on the sensor at an exposure phase in [-0.5, 0.5]; lines keep their own time all over
 /// their pixels.
 pub fn cast_at(
     sequence: &Sequence,
@@ -74,7 +74,7 @@ pub fn cast_at(
     Some(cast(&sequence.scene, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)))
 }
 
-/// Mean over the area and the exposure: every place of a fine grid, each at one of as many instants.
+/// Mean over the area and the exposure: every position of a fine grid, each at one of as many instants.
 pub fn reference(sequence: &Sequence, plan: &FramePlan, pixel: [u32; 2]) -> Option<DVec3> {
     let n = REFERENCE_SIDE;
     let mut sum = DVec3::ZERO;

@@ -77,7 +77,7 @@ pub fn ideal_twin(
     }
 }
 
-/// Colour of the pattern at a place; `None` at its border and outside.
+/// Colour of the pattern at a position; `None` at its border and outside.
 fn pattern_color_dn(ground_ned_m: DVec3, width_m: f64) -> Option<DVec3> {
     let texel = |fraction: f64| 512.0 * fraction - 0.5;
     let [x, y] = [0.5 + ground_ned_m.y / width_m, 0.5 - ground_ned_m.x / width_m].map(texel);

@@ -69,13 +69,13 @@ impl BlendedTriangles {
             .filter(|(_, (batch, _))| batch.kind.blends)
         {
             for placement in placements.iter().cloned().flatten() {
-                let place = meshes_in_view
+                let placed = meshes_in_view
                     .get(placement as usize)
                     .and_then(|&mesh| buffers.meshes.placed.get(mesh as usize));
-                let Some(place) = place else { continue };
+                let Some(placed) = placed else { continue };
                 let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
-                let camera_from_shape = camera_from_ned * place.ned_from_shape;
-                let origin_m = camera_from_ned * (place.origin_ned_m - pose.position_ned_m);
+                let camera_from_shape = camera_from_ned * placed.ned_from_shape;
+                let origin_m = camera_from_ned * (placed.origin_ned_m - pose.position_ned_m);
                 let in_view = triangles_in_view(
                     &buffers.meshes.batches[number].shape,
                     camera_from_shape,

@@ -156,7 +156,7 @@ pub(super) fn check_degrees(rows: &[ParsedRow], layout: &TableLayout) -> Result<
         |axis: usize| rows.iter().filter(|row| row.has_position()).map(move |row| row.position[axis]);
     let mut latitudes: Vec<f64> = column(0).map(f64::abs).filter(|value| *value > 0.0).collect();
     // Such degrees lie in the Gulf of Guinea, where no land is. Close to the equator they are a made-up
-    // place.
+    // position.
     let far_from_equator = median(&mut latitudes, f64::total_cmp).is_some_and(|latitude| latitude > 0.05);
     if far_from_equator
         && column(0).all(|value| value.abs() <= FRAC_PI_2)

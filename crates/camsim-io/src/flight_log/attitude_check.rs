@@ -115,7 +115,7 @@ fn in_the_other_order(attitudes: &[DQuat], reading: QuaternionReading) -> Vec<DQ
 }
 
 /// Says that the attitude is the same in all rows although the path turns. The rows of the file count: north
-/// is not the same direction at all places.
+/// is not the same direction at all positions.
 fn constant(rows: &[LogRow], raw: &[RawRow]) -> Option<String> {
     let mut attitudes = raw.iter().filter_map(|row| match row.attitude {
         RawAttitude::None => None,

@@ -73,16 +73,16 @@ struct Chosen<'a, 'b> {
 
 /// Columns of a position.
 #[derive(Clone, Copy)]
-enum PlaceColumns {
+enum PositionColumns {
     /// Latitude, longitude, height.
     Geodetic([Column; 3]),
     /// North, east, down from the filter's origin.
     Local([Column; 3]),
 }
 
-fn place(message: &Message<'_>) -> Option<PlaceColumns> {
-    let geodetic = message.columns(["Lat", "Lng", "Alt"]).map(PlaceColumns::Geodetic);
-    geodetic.or_else(|| message.columns(["PN", "PE", "PD"]).map(PlaceColumns::Local))
+fn position_columns(message: &Message<'_>) -> Option<PositionColumns> {
+    let geodetic = message.columns(["Lat", "Lng", "Alt"]).map(PositionColumns::Geodetic);
+    geodetic.or_else(|| message.columns(["PN", "PE", "PD"]).map(PositionColumns::Local))
 }
 
 /// Columns of angles.
@@ -97,9 +97,9 @@ fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Cho
     let names = if name.is_some() { &[stem][..] } else { &by_rank[..] };
     for name in names {
         let Some(message) = file.find(name) else { continue };
-        let Some(place) = place(message) else { continue };
-        // Without the origin of the filter, its metres are of no place.
-        if matches!(place, PlaceColumns::Local(_)) && origin(file).is_none() && names.len() > 1 {
+        let Some(columns) = position_columns(message) else { continue };
+        // Without the origin of the filter, its metres give no position on Earth.
+        if matches!(columns, PositionColumns::Local(_)) && origin(file).is_none() && names.len() > 1 {
             continue;
         }
         return Ok(Chosen { message, parts: instances::parts(file, message), instance });
@@ -107,7 +107,9 @@ fn choose<'a, 'b>(file: &'b DataflashFile<'a>, name: Option<&str>) -> Result<Cho
     let all: Vec<String> = file
         .all()
         .into_iter()
-        .filter(|message| place(message).is_some() && message.name != "ORGN" && message.name != "CMD")
+        .filter(|message| {
+            position_columns(message).is_some() && message.name != "ORGN" && message.name != "CMD"
+        })
         .map(|message| message.name.clone())
         .collect();
     Err(match (name, all.is_empty()) {
@@ -126,7 +128,7 @@ fn origin(file: &DataflashFile<'_>) -> Option<[f64; 3]> {
     let message = file.find("ORGN")?;
     let columns = message.columns(["Lat", "Lng", "Alt"])?;
     let kind = message.column(&["Type"]);
-    // Type 0 is the origin of the filter, 1 the place of the home.
+    // Type 0 is the origin of the filter, 1 the home position.
     let record =
         message.records.iter().find(|(_, record)| kind.is_none_or(|kind| kind.read(record) == 0.0))?;
     Some(columns.map(|column| column.read(record.1)))
@@ -150,8 +152,8 @@ impl Chosen<'_, '_> {
     fn stream(&self, file: &DataflashFile<'_>, notes: &mut Vec<Note>) -> Result<Stream, String> {
         let name = self.message.name.clone();
         let records = instances::select(file, &self.parts, self.instance, notes)?;
-        let origin = match place(self.message) {
-            Some(PlaceColumns::Local(_)) => Some(origin(file).ok_or_else(|| {
+        let origin = match position_columns(self.message) {
+            Some(PositionColumns::Local(_)) => Some(origin(file).ok_or_else(|| {
                 format!(
                     "`{name}` counts metres from an origin that the log does not have (ORGN): choose another \
                     by flight.topic"
@@ -161,22 +163,23 @@ impl Chosen<'_, '_> {
         };
         let mut readers = Vec::new();
         for Part { message, .. } in &self.parts {
-            let place = place(message).ok_or_else(|| format!("`{}` has no positions", message.name))?;
-            readers.push((time_reader(message)?, place, attitude_columns(message)));
+            let columns =
+                position_columns(message).ok_or_else(|| format!("`{}` has no positions", message.name))?;
+            readers.push((time_reader(message)?, columns, attitude_columns(message)));
         }
         let (mut rows, mut without_fix) = (Vec::with_capacity(records.len()), 0);
         for instances::Selected { number, record, part, .. } in records {
-            let (time, place, attitude) = &readers[part];
+            let (time, columns, attitude) = &readers[part];
             if !instances::has_fix(&self.parts[part], record) {
                 without_fix += 1;
                 continue;
             }
             let mut row = streams::empty_row(number, time(record));
-            row.position = match (*place, origin) {
-                (PlaceColumns::Local(columns), Some(origin)) => {
+            row.position = match (*columns, origin) {
+                (PositionColumns::Local(columns), Some(origin)) => {
                     geodetic_from_local(columns.map(|column| column.read(record)), origin)
                 }
-                (PlaceColumns::Local(columns) | PlaceColumns::Geodetic(columns), _) => {
+                (PositionColumns::Local(columns) | PositionColumns::Geodetic(columns), _) => {
                     columns.map(|column| column.read(record))
                 }
             };

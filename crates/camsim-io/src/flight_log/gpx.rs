@@ -100,7 +100,7 @@ fn raw_row(point: Node<'_, '_>) -> Result<RawRow, String> {
     };
     let latitude = number("lat", point.attribute("lat"))?;
     let longitude = number("lon", point.attribute("lon"))?;
-    xml::check_place(latitude, longitude, line)?;
+    xml::check_position(latitude, longitude, line)?;
     let metres = metres(point).map_err(|text| {
         format!("line {line}: {text}: GPX has metres; write the unit as m or ft, or convert the heights")
     });

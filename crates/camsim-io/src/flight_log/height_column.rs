@@ -71,7 +71,7 @@ fn without_datum(
             Ok(column)
         }
         (None, Some(&column)) => Err(format!(
-            "the only height, `{}`, is above take-off or ground: add the height of the place of take-off and \
+            "the only height, `{}`, is above take-off or ground: add the height of the take-off point and \
                 name the column alt",
             header.name(column)
         )),

@@ -86,7 +86,7 @@ fn regular_length(runs: &[(usize, usize)]) -> Option<usize> {
 }
 
 /// Whether the attitude goes on while the position is held, if there is one: a platform that stops at each
-/// place may hold both.
+/// position may hold both.
 fn attitudes_change(rows: &[ParsedRow], timed: &[usize], runs: &[(usize, usize)]) -> bool {
     let has_attitude = timed.iter().any(|&row| rows[row].has_attitude());
     let changes = |&&(start, length): &&(usize, usize)| {
@@ -95,7 +95,7 @@ fn attitudes_change(rows: &[ParsedRow], timed: &[usize], runs: &[(usize, usize)]
     !has_attitude || runs.iter().filter(changes).count() * 2 > runs.len()
 }
 
-/// The rows where a position is new: the first of each run, and, as the receiver stated the same place again,
+/// The rows where a position is new: the first of each run, and, as the receiver stated the same position again,
 /// each `period` rows further. The first run may have begun before the log: it counts from its end.
 fn changes(runs: &[(usize, usize)], period: usize) -> Vec<usize> {
     let mut changes = Vec::new();

@@ -46,7 +46,7 @@ struct Fix {
     gnss_m: f64,
 }
 
-/// Places of extensions within `B` records: first and last character, from 0.
+/// Positions of extensions within `B` records: first and last character, from 0.
 #[derive(Clone, Copy, Debug, Default)]
 struct Extensions {
     latitude: Option<(usize, usize)>,
@@ -196,8 +196,8 @@ impl Fix {
         }
         let time_ns = (hours * 3600 + minutes * 60 + seconds) * SECOND_NS
             + (decimals(line, extensions.seconds) * 1e9).round() as i128;
-        let angle = |degrees: Option<i64>, thousandths: Option<i64>, place: Option<(usize, usize)>| {
-            let minutes = (thousandths? as f64 + decimals(line, place)) / 1000.0;
+        let angle = |degrees: Option<i64>, thousandths: Option<i64>, range: Option<(usize, usize)>| {
+            let minutes = (thousandths? as f64 + decimals(line, range)) / 1000.0;
             (minutes < 60.0).then(|| degrees.map(|degrees| degrees as f64 + minutes / 60.0)).flatten()
         };
         let latitude =
@@ -209,7 +209,7 @@ impl Fix {
             _ => return Err(bad("hemisphere")),
         };
         if latitude > 90.0 || longitude > 180.0 {
-            return Err(bad("place"));
+            return Err(bad("position"));
         }
         // Heights below 0 begin with a minus sign.
         let height = |from: usize| line[from..from + 5].parse::<f64>().map_err(|_| bad("height"));
@@ -231,11 +231,11 @@ impl Extensions {
         let mut extensions = Self::default();
         let parts = line.get(3..).unwrap_or("").as_bytes().chunks_exact(7);
         for part in parts {
-            let place = |from: usize| {
+            let field = |from: usize| {
                 let text = std::str::from_utf8(part.get(from..from + 2)?).ok()?;
                 text.parse::<usize>().ok()?.checked_sub(1)
             };
-            let range = place(0).zip(place(2));
+            let range = field(0).zip(field(2));
             match &part[4..] {
                 b"LAD" => extensions.latitude = range,
                 b"LOD" => extensions.longitude = range,
@@ -247,9 +247,9 @@ impl Extensions {
     }
 }
 
-/// The digits at a place as decimals: `25` is 0.25; 0 where there are none.
-fn decimals(line: &str, place: Option<(usize, usize)>) -> f64 {
-    place
+/// The digits at a position as decimals: `25` is 0.25; 0 where there are none.
+fn decimals(line: &str, range: Option<(usize, usize)>) -> f64 {
+    range
         .and_then(|(first, last)| line.get(first..last.checked_add(1)?))
         .filter(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()))
         .and_then(|digits| format!("0.{digits}").parse().ok())

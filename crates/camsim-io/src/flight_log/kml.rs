@@ -74,25 +74,25 @@ fn tracks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
 }
 
 fn track(track: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
-    let [times, places, angles] =
+    let [times, positions, angles] =
         ["when", "coord", "angles"].map(|name| children(track, name).collect::<Vec<_>>());
-    if times.len() != places.len() || !(angles.is_empty() || angles.len() == times.len()) {
+    if times.len() != positions.len() || !(angles.is_empty() || angles.len() == times.len()) {
         return Err(format!(
             "line {}: the gx:Track has {} when, {} gx:coord and {} gx:angles: each point needs one of each \
                 (gx:angles may be left out for all)",
             line(track),
             times.len(),
-            places.len(),
+            positions.len(),
             angles.len()
         ));
     }
-    if !places.is_empty() {
+    if !positions.is_empty() {
         check_altitude_mode(track)?;
     }
     let mut rows = Vec::with_capacity(times.len());
-    for (index, (&when, &coord)) in times.iter().zip(&places).enumerate() {
+    for (index, (&when, &coord)) in times.iter().zip(&positions).enumerate() {
         let mut row = streams::empty_row(line(coord), Some(time_ns(when)?));
-        row.position = place(coord.text().unwrap_or(""), char::is_whitespace, line(coord))?;
+        row.position = position(coord.text().unwrap_or(""), char::is_whitespace, line(coord))?;
         if let Some(&angles) = angles.get(index)
             && let Some([heading, tilt, roll]) =
                 three(angles.text().unwrap_or(""), char::is_whitespace, line(angles))?
@@ -104,7 +104,7 @@ fn track(track: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
     Ok(rows)
 }
 
-/// Placemarks with a time and a place each.
+/// Placemarks with a time and a position each.
 fn placemarks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
     let mut rows = Vec::new();
     for placemark in elements(root, "Placemark") {
@@ -116,7 +116,7 @@ fn placemarks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
         let Some((when, text)) = when.zip(text_of(point, "coordinates")) else { continue };
         check_altitude_mode(point)?;
         let mut row = streams::empty_row(line(point), Some(time_ns(when)?));
-        row.position = place(text, |c| c == ',', line(point))?;
+        row.position = position(text, |c| c == ',', line(point))?;
         rows.push(row);
     }
     if !rows.is_empty() {
@@ -174,10 +174,10 @@ fn offset_note(root: Node<'_, '_>) -> Option<Note> {
 }
 
 /// Latitude, longitude and height of a text of longitude, latitude and height; NaN where the text is empty, as
-/// KML allows for a missing place.
-fn place(text: &str, separator: fn(char) -> bool, line: usize) -> Result<[f64; 3], String> {
+/// KML allows for a missing position.
+fn position(text: &str, separator: fn(char) -> bool, line: usize) -> Result<[f64; 3], String> {
     let Some([longitude, latitude, height]) = three(text, separator, line)? else { return Ok([f64::NAN; 3]) };
-    xml::check_place(latitude, longitude, line)?;
+    xml::check_position(latitude, longitude, line)?;
     Ok([latitude, longitude, height])
 }
 

@@ -80,9 +80,9 @@ fn receiver_column<'a>(
         if columns.iter().all(Option::is_none) {
             return None;
         }
-        let place = rows[row].position;
-        way += before.map_or(0.0, |before| distance(layout.frame, before, place));
-        before = Some(place);
+        let position = rows[row].position;
+        way += before.map_or(0.0, |before| distance(layout.frame, before, position));
+        before = Some(position);
         table.separator.split(table.rows[row].text, &mut fields);
         for (column, tracks) in columns.iter_mut().enumerate() {
             let Some(tracks_of) = tracks else { continue };
@@ -91,9 +91,10 @@ fn receiver_column<'a>(
             };
             tracks_of.changes += usize::from(value != tracks_of.last);
             tracks_of.last = value;
-            let track = tracks_of.by_value.entry(value).or_insert(Track { rows: 0, last: place, way: 0.0 });
-            track.way += distance(layout.frame, track.last, place);
-            (track.last, track.rows) = (place, track.rows + 1);
+            let track =
+                tracks_of.by_value.entry(value).or_insert(Track { rows: 0, last: position, way: 0.0 });
+            track.way += distance(layout.frame, track.last, position);
+            (track.last, track.rows) = (position, track.rows + 1);
             if tracks_of.by_value.len() > MAX_RECEIVERS {
                 *tracks = None;
             }

@@ -170,12 +170,12 @@ impl<'a> RowFields<'a, '_> {
     }
 
     /// Line and column of a field, for messages.
-    fn place(&self, column: usize) -> String {
+    fn location(&self, column: usize) -> String {
         format!("line {}, {}", self.line, self.reader.layout.describe(column))
     }
 
     fn not_a_number(&self, column: usize, text: &str) -> String {
-        format!("{}: `{text}` is not a number{}", self.place(column), hint(text))
+        format!("{}: `{text}` is not a number{}", self.location(column), hint(text))
     }
 
     fn number(&self, source: FieldSource) -> Result<f64, String> {
@@ -246,7 +246,7 @@ impl<'a> RowFields<'a, '_> {
     fn check_geodetic_range(&self, [latitude, longitude, height_m]: [f64; 3]) -> Result<(), String> {
         let sources = self.reader.layout.position;
         let fail = |source: FieldSource, what: &str, value: f64, advice: &str| {
-            Err(format!("{}: {value} is no {what}; {advice}", self.place(source.column)))
+            Err(format!("{}: {value} is no {what}; {advice}", self.location(source.column)))
         };
         for (source, what, value, limit) in
             [(sources[0], "latitude", latitude, 90.0), (sources[1], "longitude", longitude, 360.0)]

@@ -72,9 +72,9 @@ fn reference_position(layout: &TableLayout, line: &HeaderLine<'_>, spec: &Flight
     let is_origin = |[lat, lon, _]: [f64; 3]| (lat - latitude).abs() < 1e-5 && (lon - longitude).abs() < 1e-5;
     let reason = match spec.origin {
         Origin::Geodetic(origin) if is_origin(origin) => return None,
-        Origin::Geodetic(_) => "flight.origin is another place".to_owned(),
+        Origin::Geodetic(_) => "flight.origin is another position".to_owned(),
         Origin::First => format!(
-            "the positions are read as from no known place: set flight.origin = [{latitude}, {longitude}, \
+            "the positions are read as from no known origin: set flight.origin = [{latitude}, {longitude}, \
                 {height_m:?}]"
         ),
     };

@@ -31,7 +31,7 @@ mod positions;
 
 use file::{Topic, UlogFile};
 use instances::Candidate;
-use positions::{Place, PositionReader, full_name, time_field, time_ns, xyzw};
+use positions::{PositionFields, PositionReader, full_name, time_field, time_ns, xyzw};
 
 /// Topics with positions, the best first.
 const POSITIONS: [&str; 7] = [
@@ -74,7 +74,7 @@ fn positions<'a>(
     spec: &FlightSpec,
     notes: &mut Vec<Note>,
 ) -> Result<(Topic<'a>, PositionReader, Stream), String> {
-    let usable = |topic: &&Topic<'_>| !topic.messages.is_empty() && Place::of(topic).is_some();
+    let usable = |topic: &&Topic<'_>| !topic.messages.is_empty() && PositionFields::of(topic).is_some();
     let all: Vec<String> = file.topics.iter().filter(usable).map(full_name).collect();
     let mut candidates: Vec<Candidate<'a>> = match name {
         Some(name) => instances::candidates(file, name),

@@ -32,9 +32,9 @@ pub(super) fn time_ns(text: &str, line: usize) -> Result<i128, String> {
 }
 
 /// Refuses latitudes and longitudes that are none.
-pub(super) fn check_place(latitude: f64, longitude: f64, line: usize) -> Result<(), String> {
+pub(super) fn check_position(latitude: f64, longitude: f64, line: usize) -> Result<(), String> {
     if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
-        return Err(format!("line {line}: latitude {latitude}, longitude {longitude} is no place"));
+        return Err(format!("line {line}: latitude {latitude}, longitude {longitude} is no position"));
     }
     Ok(())
 }

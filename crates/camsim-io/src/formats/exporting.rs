@@ -49,16 +49,16 @@ pub enum DatasetError {
     Input {
         /// The file.
         path: PathBuf,
-        /// The place, the problem and the remedy.
+        /// The location, the problem and the remedy.
         message: String,
     },
     /// The run lacks something; the message names the key that adds it.
     #[error("{0}")]
     Missing(String),
-    /// The layout has no place for something, or the folder holds another export.
+    /// The layout cannot hold something, or the folder holds another export.
     #[error("{0}")]
     Refused(String),
-    /// A format of calibrations has no place for the camera.
+    /// A format of calibrations cannot hold the camera.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// A file cannot be written.
@@ -104,7 +104,7 @@ pub struct ExportReport {
     pub was_complete: bool,
 }
 
-/// Judges whether a layout has a place for a camera.
+/// Judges whether a layout can hold a camera.
 pub(crate) type Judge = fn(&Calibration) -> Result<(), CalibrationError>;
 
 /// A layout of another program: how it is written, and what it needs beside pictures in colour.
@@ -191,7 +191,7 @@ impl ExportJob<'_> {
 /// Exports an output folder into `folder`.
 ///
 /// # Errors
-/// The run lacks something that the layout needs, the layout has no place for something that the run has, or a
+/// The run lacks something that the layout needs, the layout cannot hold something that the run has, or a
 /// file cannot be read or written.
 pub fn export(
     run: &RunFolder,

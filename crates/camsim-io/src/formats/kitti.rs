@@ -152,7 +152,7 @@ fn write_flow(
     let step = u64::from(job.run.manifest().scenario.output.flow_step);
     let target = |frame: &RunFrame| {
         let number = frame.number + step;
-        view.frames.binary_search_by_key(&number, |other| other.number).ok().map(|place| &view.frames[place])
+        view.frames.binary_search_by_key(&number, |other| other.number).ok().map(|index| &view.frames[index])
     };
     job.each_frame(view, |frame| {
         let Some(next) = target(frame) else { return Ok(()) };
@@ -192,7 +192,7 @@ fn page(job: &ExportJob<'_>, views: &[RunCamera], sequences: &[Vec<usize>], note
         .line("pixels", PIXEL_CENTRE_0)
         .line(
             "lens",
-            "none, as `calib.txt` has no place for one: pictures are those of the camera if it is a pinhole, else of \
+            "none, as `calib.txt` cannot hold one: pictures are those of the camera if it is a pinhole, else of \
              the twin without lens. Tr is no scanner's",
         )
         .line(

@@ -72,8 +72,8 @@ fn write_carla(job: &ExportJob<'_>) -> Result<Vec<String>, DatasetError> {
         first.require(job.name(), &["color_png"])?;
         middle.require(job.name(), &["color_png"])?;
         let of_middle = |number: u64| {
-            let place = middle.frames.binary_search_by_key(&number, |frame| frame.number).ok()?;
-            Some(&middle.frames[place])
+            let index = middle.frames.binary_search_by_key(&number, |frame| frame.number).ok()?;
+            Some(&middle.frames[index])
         };
         let triples: Vec<[&RunFrame; 3]> = partners(camera, &first)
             .filter_map(|(frame, f)| Some([frame, f, of_middle(frame.number)?]))

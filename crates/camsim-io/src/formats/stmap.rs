@@ -1,4 +1,4 @@
-//! STmaps: two float pictures with, at each pixel, the place in the other picture to fetch from.
+//! STmaps: two float pictures with, at each pixel, the position in the other picture to fetch from.
 //!
 //! Red is s = (x + 0.5) / width, green t = 1 - (y + 0.5) / height, as compositors count from the corner at the
 //! bottom left. `undistort` fetches from the distorted picture, `distort` from a pinhole picture of the same
@@ -45,10 +45,10 @@ fn files(camera: &Calibration) -> Result<[CalibrationFile; 2], CalibrationError>
     ])
 }
 
-/// Places s, t of the pixels that `source` gives, by pixels in rows.
+/// Positions s, t of the pixels that `source` gives, by pixels in rows.
 fn map([width, height]: [u32; 2], source: impl Fn(DVec2) -> Option<DVec2> + Sync) -> Vec<f32> {
     let size = DVec2::new(f64::from(width), f64::from(height));
-    let place = |index: u32| {
+    let position = |index: u32| {
         let pixel = DVec2::new(f64::from(index % width), f64::from(index / width));
         match source(pixel).filter(|found| found.is_finite()) {
             Some(found) => {
@@ -58,5 +58,5 @@ fn map([width, height]: [u32; 2], source: impl Fn(DVec2) -> Option<DVec2> + Sync
             None => [-1.0; 2],
         }
     };
-    (0..width * height).into_par_iter().flat_map_iter(place).collect()
+    (0..width * height).into_par_iter().flat_map_iter(position).collect()
 }

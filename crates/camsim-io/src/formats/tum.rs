@@ -134,7 +134,7 @@ fn page(job: &ExportJob<'_>, scale: &DepthScale, notes: &[String]) -> String {
         .line(
             "stamps",
             "seconds on the run's clock at which the image's centre is exposed (middle of the exposure); the camera's \
-             delay is taken away, as the layout has no place for one. Names have ten digits before the point",
+             delay is taken away, as the layout cannot hold one. Names have ten digits before the point",
         )
         .line("`rgb`", Samples::Color.words())
         .line("`mask.png`", MASK);

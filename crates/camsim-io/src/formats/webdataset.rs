@@ -77,8 +77,8 @@ fn write_shard(
             }
             for (name, twin) in &series.twins {
                 let partner = twin.frames.binary_search_by_key(&frame.number, |partner| partner.number);
-                let Ok(place) = partner else { continue };
-                for (column, path) in twin.files(&twin.frames[place]) {
+                let Ok(index) = partner else { continue };
+                for (column, path) in twin.files(&twin.frames[index]) {
                     append(&mut tar, &format!("{key}.{}", file_ending(name, &column, &path)), &path)?;
                 }
             }

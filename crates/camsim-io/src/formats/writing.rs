@@ -1,7 +1,7 @@
 //! Calibrations for other programs: used by `camsim camera export` and by the
 //! layouts of `exporting`.
 //!
-//! What a format has no place for is named by [`export`], or refused where the calibration would be another
+//! What a format cannot hold is named by [`export`], or refused where the calibration would be another
 //! one. The readers are in [`reading`](super::reading): `import(export(x))` is x.
 
 use camsim_core::{
@@ -22,7 +22,7 @@ pub use intrinsics::Intrinsics;
 /// Why a camera cannot be written in a format.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CalibrationError {
-    /// The format has no place for it; the message says for what, and what to do.
+    /// The format cannot hold it; the message says for what, and what to do.
     #[error("{0}")]
     Refused(String),
 }

@@ -52,7 +52,7 @@ pub(super) fn read_depth(
         return Err(failure(
             path,
             format!(
-                "is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and place",
+                "is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and position",
                 size_px[0], size_px[1]
             ),
         ));

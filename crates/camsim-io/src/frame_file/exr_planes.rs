@@ -192,7 +192,7 @@ impl ExrPlanes {
         };
         let first = colors[0];
         if colors.iter().any(|plane| plane.size_px != first.size_px || plane.origin_px != first.origin_px) {
-            return Err(format!("has colour channels of different sizes or places: {}", names(&colors)));
+            return Err(format!("has colour channels of different sizes or positions: {}", names(&colors)));
         }
         Ok(colors)
     }

@@ -79,7 +79,7 @@ fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<FlowValues, FrameFi
     if u.size_px != v.size_px || u.origin_px != v.origin_px {
         return Err(failure(
             path,
-            format!("has flow channels of different sizes or places: {} {}", u.name, v.name),
+            format!("has flow channels of different sizes or positions: {} {}", u.name, v.name),
         ));
     }
     Ok((u.size_px, u.values.iter().zip(&v.values).map(|(u, v)| [*u, *v]).collect(), Some(u.origin_px)))

@@ -10,7 +10,7 @@ use super::{
     treatments::{Treatment, extension_error, extension_row},
 };
 
-/// Number of places that a message lists; the same error is often repeated in many.
+/// Number of locations that a message lists; the same error is often repeated in many.
 const MAX_LISTED: usize = 3;
 
 /// Refuses files that are not glTF 2.0.

@@ -80,8 +80,8 @@ pub(super) fn sky_warning(sequence: &Sequence) -> Option<String> {
     let fraction = seen.iter().filter(|is_sky| **is_sky).count() as f64 / seen.len().max(1) as f64;
     (fraction > MOST_SKY).then(|| {
         format!(
-            "about {:.0} % of the frames is sky, or places where the terrain has no heights: check camera.mount, \
-             flight.height and the place of the terrain",
+            "about {:.0} % of the frames is sky, or positions where the terrain has no heights: check camera.mount, \
+             flight.height and the position of the terrain",
             100.0 * fraction
         )
     })

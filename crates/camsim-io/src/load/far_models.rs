@@ -13,9 +13,9 @@ use crate::text::wording::rounded;
 const NEAR_M: f64 = 1000.0;
 /// Sizes of a model from which it is far.
 const FAR_SIZES: f64 = 20.0;
-/// Distances of places on the ground from the Earth's centre, metres.
+/// Distances of positions on the ground from the Earth's centre, metres.
 const EARTH_RADII_M: std::ops::RangeInclusive<f64> = 6.35e6..=6.39e6;
-/// Height that no place on the ground has, metres.
+/// Height that no position on the ground has, metres.
 const HIGHEST_M: f64 = 9e3;
 /// Spacing of 32-bit numbers from which it is reported, metres.
 const COARSE_M: f64 = 0.01;
@@ -63,14 +63,14 @@ pub(super) fn notes(
     let coarse = (spacing_m > COARSE_M).then(|| {
         format!(
             "its vertices have coordinates so large that 32-bit floats hold them only to {} m: subtract the coordinates \
-             of a place nearby in the program that made the model, and give that place as at",
+             of a position nearby in the program that made the model, and give that position as at",
             rounded(spacing_m)
         )
     });
     far.into_iter().chain(coarse).collect()
 }
 
-/// Whether vertices lie as far from their origin as places on the ground from the Earth's centre, NED. Coordinates of
+/// Whether vertices lie as far from their origin as positions on the ground from the Earth's centre, NED. Coordinates of
 /// a map grid may have that length too, but are low.
 fn is_earth_centred(from_origin: DVec3) -> bool {
     EARTH_RADII_M.contains(&from_origin.length()) && from_origin.z.abs() > HIGHEST_M
@@ -83,9 +83,9 @@ fn far_note(scenario: &Scenario, spec: &GltfSpec, copy: &Copy, distance_m: f64) 
     if is_earth_centred(from_origin) && centre.length() > 0.5 * from_origin.length() {
         return Some(format!(
             "the model is {km} km from the flight: its vertices lie {} km from its own origin, as far as the ground from \
-             the Earth's centre, and look like earth-centred coordinates (ECEF): subtract those of a place of the model, \
+             the Earth's centre, and look like earth-centred coordinates (ECEF): subtract those of a position of the model, \
              turn it so that up is +Y and north is -Z, and place it with geodetic, the latitude, longitude and height of \
-             that place",
+             that position",
             rounded(from_origin.length() / 1e3)
         ));
     }

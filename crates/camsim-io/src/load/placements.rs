@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{
     LoadError,
-    place_columns::{NAMES, Place, PlaceColumns, check_names},
+    position_columns::{NAMES, Position, PositionColumns, check_names},
 };
 use crate::table::{finite, open_table};
 
@@ -12,7 +12,7 @@ use crate::table::{finite, open_table};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
     /// Local position (north-east-down, metres), or latitude, longitude and height (degrees, metres).
-    pub position: Place,
+    pub position: Position,
     /// Heading, added to that of the scenario.
     pub heading_deg: f64,
     /// Scale, multiplied by that of the scenario.
@@ -34,7 +34,8 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
     let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
     let wrong = |problem: String| fail(format!("line 1: {problem}"));
     check_names(&header, |name| ["heading_deg", "scale"].contains(&name), COLUMNS).map_err(wrong)?;
-    let places = PlaceColumns::of(&header, on_ground).ok_or_else(|| wrong(missing(&header, on_ground)))?;
+    let columns =
+        PositionColumns::of(&header, on_ground).ok_or_else(|| wrong(missing(&header, on_ground)))?;
     let column = |name: &str| header.iter().position(|cell| cell == name);
     let mut placements = Vec::new();
     for record in reader.records() {
@@ -44,24 +45,28 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
         let number = |column: Option<usize>, default: f64| {
             column.map_or(Ok(default), |column| finite(&record, column)).map_err(wrong)
         };
-        let position = places.read(&record).map_err(wrong)?;
+        let position = columns.read(&record).map_err(wrong)?;
         let scale = number(column("scale"), 1.0)?;
         if scale <= 0.0 {
             return Err(wrong(format!("the scale is {scale}, not above 0")));
         }
         placements.push(Placement { position, heading_deg: number(column("heading_deg"), 0.0)?, scale });
     }
-    if placements.is_empty() { Err(fail("has no row: give a place a line".into())) } else { Ok(placements) }
+    if placements.is_empty() {
+        Err(fail("has no row: give a position a line".into()))
+    } else {
+        Ok(placements)
+    }
 }
 
-/// What is wrong with the columns of places.
+/// What is wrong with the columns of positions.
 fn missing(header: &csv::StringRecord, on_ground: bool) -> String {
     let has = |name: &str| header.iter().any(|cell| cell == name);
     match NAMES.into_iter().find(|[a, b, c]| !on_ground && has(a) && has(b) && !has(c)) {
         Some([.., name]) => format!(
             "the column `{name}` is missing; give it, or set scene.gltf.on_ground = true for what stands on the terrain"
         ),
-        None => format!("places are missing, or there are two kinds of them; {COLUMNS}"),
+        None => format!("positions are missing, or there are two kinds of them; {COLUMNS}"),
     }
 }
 
@@ -103,7 +108,7 @@ mod tests {
                 "line 1: the column `d_m` is missing; give it, or set scene.gltf.on_ground",
             ),
             ("lon_deg,lat_deg\n1,2\n", false, "line 1: the column `height_m` is missing"),
-            ("n_m,d_m\n1,2\n", false, "line 1: places are missing"),
+            ("n_m,d_m\n1,2\n", false, "line 1: positions are missing"),
             ("n_m,e_m,lat_deg,lon_deg\n1,2,3,4\n", true, "two kinds"),
             ("n_m,e_m,d_m,lat_deg\n1,2,3,4\n", false, "two kinds"),
             ("n_m,e_m,size\n1,2,3\n", true, "the column `size`"),
@@ -111,7 +116,7 @@ mod tests {
             (
                 "lat_deg,lon_deg\n47,8\n147,8\n",
                 true,
-                "line 3: latitude 147, longitude 8 are no place on Earth",
+                "line 3: latitude 147, longitude 8 are no position on Earth",
             ),
             ("lat_deg,lon_deg\n47,999\n", true, "line 2: latitude 47, longitude 999"),
             ("n_m,e_m\n1,x\n", true, "line 2: `x` is no finite number"),

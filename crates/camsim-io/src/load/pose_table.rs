@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3, EulerRot};
 
 use super::{
     LoadError,
-    place_columns::{PlaceColumns, check_names},
+    position_columns::{PositionColumns, check_names},
     scene::position_ned_m,
 };
 use crate::{
@@ -37,7 +37,7 @@ const COLUMNS: &str = "give a header with t_s (or t_ms, t_us, t_ns), n_m,e_m,d_m
 struct Columns {
     time: usize,
     unit_s: f64,
-    place: PlaceColumns,
+    position: PositionColumns,
     /// Index in [`ATTITUDES`] and the columns.
     attitude: Option<(usize, Vec<usize>)>,
 }
@@ -76,14 +76,14 @@ pub(super) fn read_pose_table(
                 "its time is not later than that of the row before: sort the rows by time".into(),
             ));
         }
-        let (local, geodetic) = columns.place.read(&record).map_err(fail)?;
+        let (local, geodetic) = columns.position.read(&record).map_err(fail)?;
         table.times_s.push(t_s);
         table.positions_ned_m.push(position_ned_m(
             scenario,
             log,
             local,
             geodetic,
-            "a place of scene.gltf.motion.poses",
+            "a position of scene.gltf.motion.poses",
         )?);
         if let (Some((kind, parts)), Some(rotations)) = (&columns.attitude, &mut table.rotations) {
             let parts = parts.iter().map(|&column| number(column)).collect::<Result<Vec<_>, _>>()?;
@@ -110,8 +110,8 @@ fn columns(header: &csv::StringRecord, on_ground: bool) -> Result<Columns, Strin
         (Some(time), None) => time,
         _ => return Err(format!("one column of times is wanted; {COLUMNS}")),
     };
-    let place = PlaceColumns::of(header, on_ground).ok_or_else(|| {
-        format!("places are missing or not whole, or there are two kinds of them; {COLUMNS}")
+    let position = PositionColumns::of(header, on_ground).ok_or_else(|| {
+        format!("positions are missing or not whole, or there are two kinds of them; {COLUMNS}")
     })?;
     let begun: Vec<usize> = (0..ATTITUDES.len())
         .filter(|&kind| ATTITUDES[kind].iter().any(|name| column(name).is_some()))
@@ -125,7 +125,7 @@ fn columns(header: &csv::StringRecord, on_ground: bool) -> Result<Columns, Strin
         }
         _ => return Err(format!("there are two kinds of attitudes; {COLUMNS}")),
     };
-    Ok(Columns { time, unit_s, place, attitude })
+    Ok(Columns { time, unit_s, position, attitude })
 }
 
 /// Rotation from body to NED of one of [`ATTITUDES`]; `None` if the numbers have none.
@@ -157,15 +157,15 @@ mod tests {
     #[test]
     fn columns_are_found_by_their_names() {
         let found = header("\u{feff}t_ns,yaw_deg,pitch_deg,roll_deg,e_m,n_m,d_m", false).unwrap();
-        assert_eq!((found.time, found.unit_s, found.place.is_local), (0, 1e-9, true));
+        assert_eq!((found.time, found.unit_s, found.position.is_local), (0, 1e-9, true));
         assert_eq!(
-            (found.place.columns, found.attitude),
+            (found.position.columns, found.attitude),
             ([Some(5), Some(4), Some(6)], Some((1, vec![3, 2, 1])))
         );
         let found = header("lat_deg,lon_deg,t_s", true).unwrap();
-        assert_eq!((found.place.is_local, found.place.columns[2], found.attitude), (false, None, None));
+        assert_eq!((found.position.is_local, found.position.columns[2], found.attitude), (false, None, None));
         for (text, wanted) in [
-            ("t_s,n_m,e_m", "places are missing"),
+            ("t_s,n_m,e_m", "positions are missing"),
             ("n_m,e_m,d_m", "one column of times"),
             ("t,n_m,e_m,d_m", "the column `t`"),
             ("t_s,t_ms,n_m,e_m,d_m", "one column of times"),

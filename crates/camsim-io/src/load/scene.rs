@@ -95,7 +95,7 @@ pub(super) fn load_scene(
     let remaining = split_intersecting_blended(&mut scene.meshes).remaining;
     notes.extend((remaining > 0).then(|| {
         format!(
-            "scene.gltf: {remaining} places where blended triangles pass through each other are not cut, and \
+            "scene.gltf: {remaining} positions where blended triangles pass through each other are not cut, and \
             may be mixed in the wrong order there"
         )
     }));
@@ -153,7 +153,7 @@ fn add_model(
     };
     let (all, mut without_ground, mut copies) = (placements.len(), 0, Vec::new());
     for (row, Placement { position: (local, geodetic), heading_deg, scale }) in (1..).zip(placements) {
-        let mut position_ned_m = position_ned_m(scenario, log, local, geodetic, "a place of scene.gltf")?;
+        let mut position_ned_m = position_ned_m(scenario, log, local, geodetic, "a position of scene.gltf")?;
         if spec.on_ground {
             let ground = scene
                 .terrain
@@ -184,7 +184,7 @@ fn add_model(
     }
     let far = far_models::notes(scenario, log, spec, &copies, model.spacing_m());
     let left_out = (without_ground > 0)
-        .then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
+        .then(|| format!("{without_ground} of {all} positions have no ground below them and are left out"));
     Ok(notes_of(left_out.into_iter().chain(far).collect()))
 }
 

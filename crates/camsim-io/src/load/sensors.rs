@@ -15,7 +15,7 @@ use crate::median::median;
 /// The sensors of a scenario on the tracked log.
 ///
 /// # Errors
-/// A sensor that needs the place of a log in local coordinates; too many samples; a day without magnetic field.
+/// A sensor that needs the position of a log in local coordinates; too many samples; a day without magnetic field.
 pub fn load_sensors(
     scenario: &Scenario,
     log: &FlightLog,
@@ -52,8 +52,8 @@ pub fn sensor_warnings(scenario: &Scenario, log: &FlightLog, trajectory: &Trajec
     });
     let nowhere = log.frame.is_none().then(|| {
         format!(
-            "the place of the flight is not known, so that imus feel {STANDARD_GRAVITY_M_S2} m/s^2 straight \
-             down: set flight.origin for the gravity of the place"
+            "the position of the flight is not known, so that imus feel {STANDARD_GRAVITY_M_S2} m/s^2 straight \
+             down: set flight.origin for the gravity of the position"
         )
     });
     let force = implausible_force(scenario, log, trajectory);

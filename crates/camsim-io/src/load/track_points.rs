@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::{
     LoadError, board_position_ned_m, height_conversions,
-    place_columns::{PlaceColumns, check_names},
+    position_columns::{PositionColumns, check_names},
     scene::{position_ned_m, undulation_m},
 };
 use crate::{board_file::read_board, table::open_table};
@@ -21,7 +21,7 @@ use crate::{board_file::read_board, table::open_table};
 /// Advice in messages about the header.
 const COLUMNS: &str = "give a header with n_m,e_m,d_m or lat_deg,lon_deg,height_m and, if wanted, name";
 
-/// Points of `[output.tracks]` that files and keys give, and the place of the local frame on Earth.
+/// Points of `[output.tracks]` that files and keys give, and the position of the local frame on Earth.
 #[derive(Clone, Debug, Default)]
 pub struct TrackInputs {
     /// The points of each source of `output.tracks.points`; none of terrain and models, which depend on what
@@ -55,9 +55,10 @@ impl TrackInputs {
     /// `None` for logs in local coordinates without an origin.
     #[must_use]
     pub fn geodetic(&self, point_ned_m: DVec3) -> Option<[f64; 3]> {
-        let place = self.frame.as_ref()?.geodetic_from_ned(point_ned_m);
-        let undulation_m = if self.shifts_heights { undulation_m(place.lat_rad, place.lon_rad) } else { 0.0 };
-        Some([place.lat_deg(), place.lon_deg(), place.height_m - undulation_m])
+        let geodetic = self.frame.as_ref()?.geodetic_from_ned(point_ned_m);
+        let undulation_m =
+            if self.shifts_heights { undulation_m(geodetic.lat_rad, geodetic.lon_rad) } else { 0.0 };
+        Some([geodetic.lat_deg(), geodetic.lon_deg(), geodetic.height_m - undulation_m])
     }
 }
 
@@ -90,7 +91,7 @@ fn read_points(
     let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
     let wrong = |problem: String| fail(format!("line 1: {problem}"));
     check_names(&header, |name| name == "name", COLUMNS).map_err(wrong)?;
-    let places = PlaceColumns::of(&header, false)
+    let columns = PositionColumns::of(&header, false)
         .ok_or_else(|| wrong(format!("positions are incomplete, or of two kinds; {COLUMNS}")))?;
     let name_column = header.iter().position(|cell| cell == "name");
     let mut points = Vec::new();
@@ -98,7 +99,7 @@ fn read_points(
         let record = record.map_err(|error| fail(error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
         let (at, geodetic) =
-            places.read(&record).map_err(|problem| fail(format!("line {line}: {problem}")))?;
+            columns.read(&record).map_err(|problem| fail(format!("line {line}: {problem}")))?;
         let name = name_column.and_then(|column| record.get(column)).unwrap_or_default();
         points.push(TrackPoint {
             source: source.to_owned(),

@@ -1,4 +1,4 @@
-//! Several rasters as tiles of one grid: which place each has, and which tile holds a pixel.
+//! Several rasters as tiles of one grid: which position each has, and which tile holds a pixel.
 
 use std::path::Path;
 
@@ -106,7 +106,7 @@ pub(super) fn join<'a>(tiles: impl Iterator<Item = Placed<'a>>) -> Result<Joined
     };
     let degenerate = || TerrainFileError::DegenerateGeoreference { path: first.path.into() };
     let pixel_from_model = first.model_from_pixel.inverse().ok_or_else(degenerate)?;
-    let mut places = Vec::new();
+    let mut starts = Vec::new();
     for (_, tile) in &tiles {
         if tile.crs.epsg != first.crs.epsg {
             return Err(meaning(
@@ -135,11 +135,11 @@ pub(super) fn join<'a>(tiles: impl Iterator<Item = Placed<'a>>) -> Result<Joined
         if off_px.is_nan() || off_px > MAX_OFFSET_PX {
             return Err(meaning(tile.path, off_grid(tile, first, off_px, &command_paths)));
         }
-        places.push(start);
+        starts.push(start);
     }
-    let low = [0, 1].map(|k: usize| places.iter().map(|place| place[k]).fold(f64::INFINITY, f64::min));
+    let low = [0, 1].map(|k: usize| starts.iter().map(|start| start[k]).fold(f64::INFINITY, f64::min));
     let high = [0, 1].map(|k: usize| {
-        let ends = places.iter().zip(&tiles).map(|(place, (_, tile))| place[k] + f64::from(tile.size[k]));
+        let ends = starts.iter().zip(&tiles).map(|(start, (_, tile))| start[k] + f64::from(tile.size[k]));
         ends.fold(f64::NEG_INFINITY, f64::max)
     });
     let size = [0, 1].map(|k: usize| high[k] - low[k]);
@@ -156,7 +156,7 @@ pub(super) fn join<'a>(tiles: impl Iterator<Item = Placed<'a>>) -> Result<Joined
     }
     Ok(Joined {
         order: tiles.iter().map(|(index, _)| *index).collect(),
-        offsets: places.iter().map(|place| [0, 1].map(|k: usize| (place[k] - low[k]) as u32)).collect(),
+        offsets: starts.iter().map(|start| [0, 1].map(|k: usize| (start[k] - low[k]) as u32)).collect(),
         size: size.map(|side| side as u32),
         // The first tile's own georeference where that is the corner: no rounding.
         model_from_pixel: match low {
@@ -240,7 +240,7 @@ impl TileIndex {
         Self { offsets: offsets.to_vec(), cuts, cells }
     }
 
-    /// The tiles that hold a pixel, each with the pixel's place in it.
+    /// The tiles that hold a pixel, each with the pixel's position in it.
     pub fn at(&self, pixel: [u32; 2]) -> impl Iterator<Item = (usize, [u32; 2])> {
         let [column, row] = [0, 1].map(|k: usize| self.cuts[k].partition_point(|cut| *cut <= pixel[k]));
         let cell = match (column.checked_sub(1), row.checked_sub(1)) {

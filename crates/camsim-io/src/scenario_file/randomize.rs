@@ -1,6 +1,6 @@
 //! `[randomize]`: scenarios whose values are drawn.
 //!
-//! Variation k of a scenario is a scenario without `[randomize]`, with concrete values in place of the drawn ones. Each
+//! Variation k of a scenario is a scenario without `[randomize]`, with concrete values instead of the drawn ones. Each
 //! value is a function of the seed, its key as written, and k, so that variations can be made in any order, and values
 //! stay when other keys are added or fixed by `--set`.
 
@@ -185,7 +185,7 @@ impl RandomScenario {
         self.spec.as_ref()?.variations
     }
 
-    /// `[randomize]` with absolute paths, for the same scenario in another place; `None` without one.
+    /// `[randomize]` with absolute paths, for the same scenario in another folder; `None` without one.
     ///
     /// # Errors
     /// Of a key with `*`, only some elements are drawn, which a table cannot say.
@@ -233,7 +233,7 @@ impl RandomScenario {
     /// What variation `index` draws, without a check of the scenario.
     ///
     /// # Errors
-    /// [`ScenarioError::Variation`]: a drawn value does not fit its place.
+    /// [`ScenarioError::Variation`]: a drawn value does not fit its key.
     pub fn drawn(&self, index: u64) -> Result<Vec<Drawn>, ScenarioError> {
         let mut drawn = Vec::new();
         let Some(spec) = &self.spec else { return Ok(drawn) };

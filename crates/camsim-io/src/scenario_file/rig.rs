@@ -1,4 +1,4 @@
-//! Scenarios of one camera or several as trees of values: `cameras` in place of `camera`.
+//! Scenarios of one camera or several as trees of values: `cameras` instead of `camera`.
 
 use camsim_core::scenario::{CameraSpec, Problem, Rig, Scenario};
 use serde::{Serialize, de::Error as _};

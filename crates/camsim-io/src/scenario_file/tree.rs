@@ -20,7 +20,7 @@ use super::{
 
 mod cameras;
 
-/// Text in place of a value that takes the key out, so that its default holds. No shell can pass it.
+/// Text instead of a value that takes the key out, so that its default holds. No shell can pass it.
 pub const UNSET: &str = "\0";
 
 /// What the parser says of whole numbers beyond those of TOML, by how far they are.
@@ -241,7 +241,7 @@ impl Tree {
         if ["camera", CAMERAS].contains(&key) { self.resolve_cameras() } else { Ok(()) }
     }
 
-    /// What to write in place of a key within a list of tables that is not there; `None` if no list is missing.
+    /// What to write instead of a key within a list of tables that is not there; `None` if no list is missing.
     fn missing_list(&self, key: &str, value: &Value) -> Option<String> {
         let known = |key: &str| {
             let steps: Vec<&str> = key.split('.').filter(|step| step.parse::<usize>().is_err()).collect();
@@ -264,7 +264,7 @@ impl Tree {
         ))
     }
 
-    /// A key of `--set` with numbers in place of the names of cameras and of other elements of lists.
+    /// A key of `--set` with numbers instead of the names of cameras and of other elements of lists.
     pub(super) fn numbered(&self, key: &str) -> Result<String, String> {
         let key = self.with_camera_number(key)?;
         key.split('.').try_fold(String::new(), |above, step| match get(&self.root, &above) {
@@ -306,7 +306,7 @@ fn number_of(list: &[Value], step: &str, key: &str) -> Result<String, String> {
     }
 }
 
-/// The place of the value at a dotted key. Tables on the way to it are added, and elements of lists are named by
+/// The slot of the value at a dotted key. Tables on the path to it are added, and elements of lists are named by
 /// their numbers.
 fn slot<'t>(
     root: &'t mut Table,
@@ -315,10 +315,10 @@ fn slot<'t>(
 ) -> Result<&'t mut Value, ScenarioError> {
     let mut steps: Vec<&str> = key.split('.').collect();
     let leaf = steps.pop().unwrap_or_default();
-    let mut place = root;
+    let mut table = root;
     let mut steps = steps.into_iter();
     while let Some(step) = steps.next() {
-        let mut next = place.entry(step).or_insert_with(|| Value::Table(Table::new()));
+        let mut next = table.entry(step).or_insert_with(|| Value::Table(Table::new()));
         if let Value::Array(array) = next {
             let (length, index) = (array.len(), steps.next());
             let number = index.unwrap_or(leaf).parse::<usize>().ok();
@@ -332,11 +332,11 @@ fn slot<'t>(
                 return Ok(next);
             }
         }
-        place = next
+        table = next
             .as_table_mut()
             .ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
     }
-    Ok(place.entry(leaf).or_insert_with(|| Value::Boolean(false)))
+    Ok(table.entry(leaf).or_insert_with(|| Value::Boolean(false)))
 }
 
 /// The value at a dotted key, with elements of lists by their numbers.

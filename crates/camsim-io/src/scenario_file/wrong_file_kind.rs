@@ -1,4 +1,4 @@
-//! Recognises files that are given in place of a scenario, and says how each is used.
+//! Recognises files that are given instead of a scenario, and says how each is used.
 
 use std::path::Path;
 

@@ -63,8 +63,8 @@ pub(crate) fn xyzw(q: DQuat) -> [f64; 4] {
 
 /// The number with the fewest decimals within a tolerance.
 pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {
-    let rounded = |places: i32| {
-        let scale = 10f64.powi(places);
+    let rounded = |decimals: i32| {
+        let scale = 10f64.powi(decimals);
         (value * scale).round() / scale + 0.0
     };
     (0..=15).map(rounded).find(|short| (short - value).abs() <= tolerance).unwrap_or(value)

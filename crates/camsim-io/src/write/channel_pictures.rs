@@ -135,11 +135,11 @@ fn ends(mut values: Vec<f32>) -> [f32; 2] {
 }
 
 fn turbo(fraction: f32) -> [u8; 3] {
-    let place = fraction.clamp(0.0, 1.0) * (TURBO.len() - 1) as f32;
-    let low = (place as usize).min(TURBO.len() - 2);
+    let position = fraction.clamp(0.0, 1.0) * (TURBO.len() - 1) as f32;
+    let low = (position as usize).min(TURBO.len() - 2);
     let mix = |k: usize| {
         let [a, b] = [TURBO[low][k], TURBO[low + 1][k]].map(f32::from);
-        (a + (b - a) * (place - low as f32)).round() as u8
+        (a + (b - a) * (position - low as f32)).round() as u8
     };
     [0, 1, 2].map(mix)
 }

@@ -145,7 +145,7 @@ fn within_half(value: f32) -> f32 {
     value.clamp(-65504.0, 65504.0)
 }
 
-/// A ZIP block of OpenEXR: the bytes at even places, then those at odd ones, each as its difference to the one
+/// A ZIP block of OpenEXR: the bytes at even indices, then those at odd ones, each as its difference to the one
 /// before plus 128, by zlib. A block that does not become smaller is stored as it is.
 fn zip(bytes: &[u8]) -> Vec<u8> {
     let half = bytes.len().div_ceil(2);
@@ -160,8 +160,8 @@ fn zip(bytes: &[u8]) -> Vec<u8> {
         }
     }
     // Backwards, so that no difference is taken of a difference.
-    for place in (1..sorted.len()).rev() {
-        sorted[place] = sorted[place].wrapping_sub(sorted[place - 1]).wrapping_add(128);
+    for index in (1..sorted.len()).rev() {
+        sorted[index] = sorted[index].wrapping_sub(sorted[index - 1]).wrapping_add(128);
     }
     let mut compressed = vec![0; zlib_rs::compress_bound(sorted.len())];
     let config = zlib_rs::DeflateConfig::new(ZIP_LEVEL);

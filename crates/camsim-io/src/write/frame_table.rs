@@ -24,8 +24,8 @@ pub struct FrameRecord {
     pub stamp_ns: i64,
     /// Pose of the camera at the stamp.
     pub pose: CameraPose,
-    /// The same place on Earth, where the flight has an origin there. One table has one kind only.
-    pub place: Option<Geodetic>,
+    /// The same position on Earth, where the flight has an origin there. One table has one kind only.
+    pub geodetic: Option<Geodetic>,
     /// Camera of the source coordinates.
     pub source: SourceFrame,
     /// Exposure, where it follows the pictures. One table has one kind only.
@@ -78,7 +78,7 @@ pub struct FrameTable {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TableKind {
     /// Whether the flight is on Earth.
-    pub has_places: bool,
+    pub has_geodetic: bool,
     /// Whether exposures follow the pictures.
     pub has_exposures: bool,
     /// Whether it is of a burst.
@@ -89,7 +89,7 @@ impl TableKind {
     /// The columns of values.
     fn columns(self) -> Columns<FrameRecord> {
         Columns::with(|part| match part {
-            Part::Places => self.has_places,
+            Part::Geodetic => self.has_geodetic,
             Part::Exposures => self.has_exposures,
             Part::Instants => self.has_instants,
             Part::Motion | Part::Poses => false,
@@ -99,8 +99,8 @@ impl TableKind {
     /// The kind of a header, and the columns of files with a comma before each.
     fn of_header(header: &str) -> Option<(Self, &str)> {
         let bits = (0..8).map(|bits: u8| [1, 2, 4].map(|bit| bits & bit > 0));
-        let fits = bits.filter_map(|[has_places, has_exposures, has_instants]| {
-            let kind = Self { has_places, has_exposures, has_instants };
+        let fits = bits.filter_map(|[has_geodetic, has_exposures, has_instants]| {
+            let kind = Self { has_geodetic, has_exposures, has_instants };
             let files = header.strip_prefix(&kind.columns().header())?;
             (files.is_empty() || files.starts_with(',')).then_some((kind, files))
         });
@@ -266,7 +266,7 @@ mod tests {
         };
         let files =
             columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
-        FrameRecord { frame, instant: None, stamp_ns: 9, pose, place: None, source, exposure: None, files }
+        FrameRecord { frame, instant: None, stamp_ns: 9, pose, geodetic: None, source, exposure: None, files }
     }
 
     #[test]
@@ -360,18 +360,19 @@ mod tests {
     }
 
     #[test]
-    fn places_and_exposures_have_columns_before_the_files() {
-        let kind = TableKind { has_places: true, ..TableKind::default() };
+    fn positions_on_earth_and_exposures_have_columns_before_the_files() {
+        let kind = TableKind { has_geodetic: true, ..TableKind::default() };
         let mut table = FrameTable::new(kind);
-        let place = Some(Geodetic::from_deg(47.5, -8.25, 430.0));
-        table.insert(&FrameRecord { place, ..record(4, &["color_png"]) });
+        let geodetic = Some(Geodetic::from_deg(47.5, -8.25, 430.0));
+        table.insert(&FrameRecord { geodetic, ..record(4, &["color_png"]) });
         let text = table.to_csv();
         let (header, row) = text.trim_end().split_once('\n').unwrap();
         assert!(header.ends_with(",ideal_qz,lat_deg,lon_deg,height_m,color_png"), "{header}");
         let at = header.split(',').position(|name| name == "lat_deg").unwrap();
-        let place: Vec<f64> = row.split(',').skip(at).take(3).map(|value| value.parse().unwrap()).collect();
+        let geodetic: Vec<f64> =
+            row.split(',').skip(at).take(3).map(|value| value.parse().unwrap()).collect();
         assert!(
-            (place[0] - 47.5).abs() < 1e-12 && (place[1] + 8.25).abs() < 1e-12 && place[2] == 430.0,
+            (geodetic[0] - 47.5).abs() < 1e-12 && (geodetic[1] + 8.25).abs() < 1e-12 && geodetic[2] == 430.0,
             "{row}"
         );
         assert_eq!(FrameTable::parse(&text).unwrap(), table);

@@ -4,7 +4,7 @@ use super::{FrameRecord, ObjectRecord, PointRecord, TimingRecord, TrackRecord};
 use crate::columns::{
     Column,
     Get::{Flag, Index, MaybeNumber, Ned, Number, Text, Whole, Wxyz},
-    Part::{Exposures, Instants, Motion, Places},
+    Part::{Exposures, Geodetic, Instants, Motion},
     TableRow, column, of, plain,
 };
 
@@ -28,9 +28,15 @@ impl TableRow for FrameRecord {
         column("ideal_position_ned_m", "ideal_*", "its centre", Ned(|row| row.source.pose.position_ned_m)),
         column("ideal_wxyz", "ideal_q*", "its attitude", Wxyz(|row| row.source.pose.ned_from_camera)),
         // On Earth: with a log of latitudes and longitudes, or `flight.origin`, whose vertical datum heights have.
-        of(Places, plain("lat_deg", "at the stamp (WGS-84)", MaybeNumber(|row| Some(row.place?.lat_deg())))),
-        of(Places, plain("lon_deg", "at the stamp", MaybeNumber(|row| Some(row.place?.lon_deg())))),
-        of(Places, plain("height_m", "as `flight.origin`'s", MaybeNumber(|row| Some(row.place?.height_m)))),
+        of(
+            Geodetic,
+            plain("lat_deg", "at the stamp (WGS-84)", MaybeNumber(|row| Some(row.geodetic?.lat_deg()))),
+        ),
+        of(Geodetic, plain("lon_deg", "at the stamp", MaybeNumber(|row| Some(row.geodetic?.lon_deg())))),
+        of(
+            Geodetic,
+            plain("height_m", "as `flight.origin`'s", MaybeNumber(|row| Some(row.geodetic?.height_m))),
+        ),
         of(Exposures, plain("exposure_ms", AUTO, MaybeNumber(|row| Some(1e3 * row.exposure?.time_s)))),
         of(Exposures, plain("gain", AUTO, MaybeNumber(|row| Some(row.exposure?.gain)))),
         of(
@@ -67,9 +73,9 @@ impl TableRow for PointRecord {
         plain("source", "`terrain`, `vertices`, `board` or a table", Text(|row| &row.point.source)),
         column("position_ned_m", "*_m", "at path time 0 if it moves", Ned(|row| row.point.position_ned_m)),
         of(Motion, plain("moves", "if any point does", Flag(|row| row.point.moves_with.is_some()))),
-        of(Places, plain("lat_deg", ON_EARTH, MaybeNumber(|row| Some(row.place?[0])))),
-        of(Places, plain("lon_deg", ON_EARTH, MaybeNumber(|row| Some(row.place?[1])))),
-        of(Places, plain("height_m", "as heights of the log", MaybeNumber(|row| Some(row.place?[2])))),
+        of(Geodetic, plain("lat_deg", ON_EARTH, MaybeNumber(|row| Some(row.geodetic?[0])))),
+        of(Geodetic, plain("lon_deg", ON_EARTH, MaybeNumber(|row| Some(row.geodetic?[1])))),
+        of(Geodetic, plain("height_m", "as heights of the log", MaybeNumber(|row| Some(row.geodetic?[2])))),
     ];
 }
 

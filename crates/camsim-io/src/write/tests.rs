@@ -178,7 +178,7 @@ fn empty_format_writes_no_files() {
 #[test]
 fn failures_name_the_path_and_leave_no_files() {
     let dir = tempfile::tempdir().unwrap();
-    // A file in place of a folder causes an error for all users, root included.
+    // A file instead of a folder causes an error for all users, root included.
     fs::write(dir.path().join("color"), "in the way").unwrap();
     let files = FrameFiles::new(dir.path(), &OutputSpec::default(), OutputEncoding::Srgb8);
     let mut writer = FrameWriter::new(files, 2);

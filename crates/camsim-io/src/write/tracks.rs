@@ -27,7 +27,7 @@ pub(crate) struct PointRecord {
     pub(crate) number: u32,
     pub(crate) point: TrackPoint,
     /// Latitude, longitude, and height as those of the flight log.
-    pub(crate) place: Option<[f64; 3]>,
+    pub(crate) geodetic: Option<[f64; 3]>,
 }
 
 /// A line of `tracks.csv`.
@@ -40,17 +40,17 @@ pub(crate) struct TrackRecord {
 
 /// Text of `points.csv`.
 pub fn points_csv(points: &[TrackPoint], geodetic: &dyn Fn(&TrackPoint) -> Option<[f64; 3]>) -> String {
-    let has_places = points.first().is_some_and(|point| geodetic(point).is_some());
+    let has_geodetic = points.first().is_some_and(|point| geodetic(point).is_some());
     let has_motion = points.iter().any(|point| point.moves_with.is_some());
     let columns = Columns::with(|part| match part {
         Part::Motion => has_motion,
-        Part::Places => has_places,
+        Part::Geodetic => has_geodetic,
         _ => false,
     });
     let record = |(number, point): (u32, &TrackPoint)| PointRecord {
         number,
         point: point.clone(),
-        place: geodetic(point),
+        geodetic: geodetic(point),
     };
     columns.csv((0..).zip(points).map(record))
 }

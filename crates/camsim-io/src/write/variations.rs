@@ -33,7 +33,7 @@ pub enum VariationsError {
         /// What differs.
         what: String,
     },
-    /// A value does not fit its place.
+    /// A value does not fit its key.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// It cannot be read or written.

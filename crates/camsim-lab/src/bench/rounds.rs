@@ -139,9 +139,9 @@ pub fn measure(variants: &[TimedSequence<'_>], limits: RoundLimits) -> Result<Ve
     for round in 0..limits.max_rounds {
         let mut is_finished = true;
         // The order rotates from round to round.
-        for place in 0..count {
+        for k in 0..count {
             let (session, frames, is_still, burst, Measured { times, .. }) =
-                &mut running[(place + round) % count];
+                &mut running[(k + round) % count];
             let per_frame = |burst_ms: f64| burst_ms / *burst as f64;
             if !limits.has_round(round, *burst as f64 * times.wall_ms.iter().sum::<f64>(), count) {
                 continue;

@@ -265,7 +265,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<ExperimentReport, ReproduceError>
 /// Plot of [`CircleDetections::rings`]; `None` without points.
 fn radius_plot(series: Vec<Series>) -> Option<Plot> {
     series.iter().any(|series| !series.points.is_empty()).then(|| Plot {
-        title: "Error of circle centres by their place in the picture".into(),
+        title: "Error of circle centres by their position in the picture".into(),
         x_label: "distance from the principal point, px".into(),
         y_label: "error, px RMS".into(),
         log: [false, false],

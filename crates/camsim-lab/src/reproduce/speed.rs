@@ -103,8 +103,8 @@ fn measure(variants: &mut [TimedSession<'_>]) -> Result<(), ReproduceError> {
             break;
         }
         let count = variants.len();
-        for place in 0..count {
-            let variant = &mut variants[(place + round) % count];
+        for k in 0..count {
+            let variant = &mut variants[(k + round) % count];
             let begin = Instant::now();
             render_burst(&mut variant.session, round as u64)?;
             variant.ms.push(1e3 * begin.elapsed().as_secs_f64() / BURST as f64);

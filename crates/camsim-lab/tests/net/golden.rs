@@ -42,7 +42,7 @@ pub fn rounded(value: Value) -> Value {
     }
 }
 
-/// Adds a line for each place below `at` where `found` is not `golden`: numbers with a fraction may differ by
+/// Adds a line for each value below `at` where `found` is not `golden`: numbers with a fraction may differ by
 /// rounding, everything else decides something and must be equal.
 pub fn compare(at: &str, golden: &Value, found: &Value, differences: &mut Vec<String>) {
     match (golden, found) {

@@ -27,7 +27,7 @@ pub struct Kept {
 /// By subject, frame, renderer and channel.
 pub type Checksums = BTreeMap<String, Kept>;
 
-/// One engine for each way to place passes.
+/// One engine for each placement of passes.
 pub struct Engines {
     pub gpu: Engine,
     cpu: Engine,

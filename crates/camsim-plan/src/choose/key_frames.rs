@@ -32,7 +32,7 @@ pub(crate) fn spread(path: &CameraPath, [first_s, last_s]: [f64; 2], count: u32)
 /// A second one shows most of what is disoccluded: only rows near the ends of the window see strips then, and
 /// half as wide ones. It takes as long as the first, so it is for disocclusion that would be a large part of
 /// either tolerance: of `quality.max_error_dn` by their colours, which is an RMS over the picture, or of
-/// `quality.max_error_px` by the places that these are read from, which are off by as much as the strips are
+/// `quality.max_error_px` by the positions that these are read from, which are off by as much as the strips are
 /// wide, and may be so in a hundredth of the pixels.
 pub(crate) fn wanted(
     disocclusion: Option<&Disocclusion>,

@@ -7,7 +7,7 @@
 //! | ideal colour | 8 bit sRGB, read and averaged as stored; one sample a pixel, also at silhouettes |
 //! | lens inverse | Gauss-Newton of [`camsim_core::lens::paper`] for every pixel of every frame, except where the vignette is black (its program does so too) and coordinates are not wanted |
 //! | time | camsim's own rows, delay and interlacing; key instant in the middle of the window, as in the paper's program |
-//! | displacement | eq. 18 by Heun's steps of 2.5 deg from the ray's own place, at the *nearest* texel's depth |
+//! | displacement | eq. 18 by Heun's steps of 2.5 deg from the ray's own position, at the *nearest* texel's depth |
 //! | exposure | [`BLUR_SAMPLES`] samples, or `quality.blur_samples`, on the straight segment between its two ends, ends included; no footprint |
 //! | fog | linear and after the blur: full at `scene.fog_visibility_m`, of the sky's colour |
 //! | photometric | vignette, light and noise on stored values; decoded to linear at the very end |

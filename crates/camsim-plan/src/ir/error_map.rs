@@ -51,16 +51,15 @@ impl ErrorMap {
     /// at silhouettes or without a source.
     #[must_use]
     pub fn near_px(&self, pixel: [u32; 2]) -> Option<f64> {
-        let is_near = |place: [u32; 2]| {
-            (0..2).all(|axis| f64::from(place[axis].abs_diff(pixel[axis])) <= self.reach_px)
-        };
-        self.known().filter(|(place, _)| is_near(*place)).map(|(_, px)| px).reduce(f64::max)
+        let is_near =
+            |at: [u32; 2]| (0..2).all(|axis| f64::from(at[axis].abs_diff(pixel[axis])) <= self.reach_px);
+        self.known().filter(|(at, _)| is_near(*at)).map(|(_, px)| px).reduce(f64::max)
     }
 
     /// Probes that have an error, and their errors.
     pub fn known(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
-        self.pixels.iter().filter_map(|place| match place.error {
-            SourceError::Within(px) => Some((place.pixel, px)),
+        self.pixels.iter().filter_map(|entry| match entry.error {
+            SourceError::Within(px) => Some((entry.pixel, px)),
             _ => None,
         })
     }

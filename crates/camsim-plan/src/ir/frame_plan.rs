@@ -145,7 +145,7 @@ impl FramePlan {
     }
 
     /// The ideal pixel that the first pixel of the output is, where pixels of the output are those of the
-    /// ideal frame: nothing bends rays or moves, both cameras are as fine, and places of pixels are whole
+    /// ideal frame: nothing bends rays or moves, both cameras are as fine, and positions of pixels are whole
     /// pixels apart, as `view/ideal_extent.rs` has them. Then nothing is read between them.
     #[must_use]
     pub fn copied_from(&self) -> Option<[u32; 2]> {

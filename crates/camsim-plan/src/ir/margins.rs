@@ -2,7 +2,7 @@
 
 /// Source error: the largest of a few hundred probes misses some pixels.
 pub(crate) const SOURCE_ERROR: f64 = 1.25;
-/// Picture error by resampling and misregistration: texture spectra differ from place to place.
+/// Picture error by resampling and misregistration: texture spectra differ over the picture.
 pub(crate) const TEXTURES: f64 = 1.2;
 /// Picture error at silhouettes: of a few hundred probes a few are at silhouettes.
 pub(crate) const SILHOUETTES: f64 = 1.3;
@@ -17,7 +17,7 @@ pub(crate) const MOST_BETWEEN_BORDERS: f64 = 2.0;
 /// 0.51/255 in ten frames, with 3500 houses or none; the prediction with this factor was 0.8 to 1.1 times
 /// that, and more since the skyline is known by itself.
 pub(crate) const RIDGES: f64 = 1.5;
-/// Picture error at the skyline: it is known at some places, between which it is more rugged.
+/// Picture error at the skyline: it is known at some positions, between which it is more rugged.
 pub(crate) const SKYLINE: f64 = 1.5;
 /// Picture error at the skyline of a terrain that is drawn coarser than it is.
 pub(crate) const SKYLINE_OF_TERRAIN: f64 = 1.2;

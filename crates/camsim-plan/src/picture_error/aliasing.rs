@@ -152,7 +152,7 @@ impl BorderPixels {
 
 /// Squared error that as many rays of their own leave in the pixels that a border passes over, as
 /// [`aliasing2`] counts it; path over the exposure in sides of the pixel. Fitted to borders drawn at random.
-/// Without a path only the rays' places within the pixel count, which are more even than these and their
+/// Without a path only the rays' positions within the pixel count, which are more even than these and their
 /// instants together.
 fn missed_by_rays(rays: u32, path_px: f64) -> f64 {
     (1.0 + 3.0 * path_px.min(1.0) + 0.2 * path_px) * 0.12 / f64::from(rays).powf(1.5)
@@ -226,7 +226,7 @@ impl BorderWave {
             f,
             weight: stands_for / (4.0 * (PI * length).powi(3)),
             left_by_samples: SAMPLE_POSITIONS
-                .map(|place| (2.0 * PI * place.dot(f)).cos())
+                .map(|position| (2.0 * PI * position.dot(f)).cos())
                 .iter()
                 .sum::<f64>()
                 / f64::from(SAMPLES),

@@ -65,12 +65,12 @@ impl BlendSearch<'_> {
         })
     }
 
-    /// Squared error at a place of a probe's part of the picture (-0.5 to 0.5), of the linear range, mean
+    /// Squared error at a position of a probe's part of the picture (-0.5 to 0.5), of the linear range, mean
     /// over the channels; `None` where light is of one surface.
-    fn square(&self, i: usize, probe: &Probe, place: DVec2) -> Option<f64> {
+    fn square(&self, i: usize, probe: &Probe, position: DVec2) -> Option<f64> {
         let phase = PHASES[i % PHASES.len()];
         let size_px = self.reach.camera.size_px;
-        let offset_px = (self.reach.probe_px * place).round();
+        let offset_px = (self.reach.probe_px * position).round();
         let [x, y] = [(0, offset_px.x), (1, offset_px.y)].map(|(axis, offset): (usize, f64)| {
             (f64::from(probe.pixel[axis]) + offset).clamp(0.0, f64::from(size_px[axis] - 1)) as u32
         });

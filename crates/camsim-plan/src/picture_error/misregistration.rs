@@ -1,4 +1,4 @@
-//! Misregistration: picture error by sources beside their place.
+//! Misregistration: picture error by sources beside their position.
 //!
 //! A pixel shows the waves of its texture, of frequencies `f` (cycles a pixel of the camera) and with the
 //! power that its area and the exposure leave of them. Moved by `e` pixels in any direction a wave differs

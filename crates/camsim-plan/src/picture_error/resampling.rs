@@ -1,6 +1,6 @@
 //! What resampling and the samples of the exposure cost in the picture.
 //!
-//! At a few places of the image (`texture_probes.rs`) the surface in view, its texture's power spectrum
+//! At a few positions of the image (`texture_probes.rs`) the surface in view, its texture's power spectrum
 //! (`texture_spectra.rs`) and the two maps from the texture over the ideal frame to the output pixel are
 //! known. What each stage leaves of a wave of the texture has a closed form (`transfer.rs`): the filter of
 //! the ideal frame's surfaces, the reads between its pixels with what they alias, the grid of reads, the

@@ -1,7 +1,7 @@
-//! Parts of the resampling error at one place of the image. Sampling plans have most of their parts in
+//! Parts of the resampling error at one position of the image. Sampling plans have most of their parts in
 //! common: what the texture has and what is wanted of it depends on the ideal frame's scale, what the
 //! surfaces' filter leaves on that and the filter, what the reads leave on that and the reads. Each part is
-//! worked out once a place.
+//! worked out once a position.
 
 use std::sync::{Arc, Mutex};
 

@@ -1,6 +1,6 @@
 //! What it costs that the sky begins elsewhere in an ideal frame.
 //!
-//! What is beyond it is as far as can be: from another place the surface before it is elsewhere by all of its
+//! What is beyond it is as far as can be: from another position the surface before it is elsewhere by all of its
 //! own parallax. Pixels that first look for a surface within [`camsim_core::temporal::SKY_REACH_PX`] of where
 //! it is go with it; farther away the pixels between show sky for surface or surface for sky.
 
@@ -74,7 +74,7 @@ impl SkylinePoint {
     /// Squared error of pixels across the skyline, of their squared contrast, where the terrain is drawn
     /// higher or lower there.
     fn lowered_px(&self, detail: &TerrainDetail<'_>, focal_px: DVec2) -> f64 {
-        /// From above the place, metres: as far as may be, and near enough for its digits.
+        /// From above the point, metres: as far as may be, and near enough for its digits.
         const ABOVE_M: f64 = 1000.0;
         let Some((hit, point_m)) = &self.ground else { return 0.0 };
         let down_m =
@@ -109,14 +109,14 @@ fn wrong_px(moved_px: f64, guess_px: f64, taken_px: f64, reach_px: f64) -> f64 {
         + off_px(moved_px, [beyond_reach_px, f64::INFINITY])
 }
 
-/// Squared error of pixels with their middles between two places, that show the skyline moved by so much.
+/// Squared error of pixels with their middles between two positions, that show the skyline moved by so much.
 fn off_px(moved_px: f64, [from_px, to_px]: [f64; 2]) -> f64 {
     const STEPS: u32 = 32;
     let covered = |beyond_px: f64| (0.5 - beyond_px).clamp(0.0, 1.0);
     let from_px = from_px.max(-0.5 + moved_px.min(0.0));
     let step_px = (to_px.min(0.5 + moved_px.max(0.0)) - from_px).max(0.0) / f64::from(STEPS);
-    let places = (0..STEPS).map(|k| from_px + step_px * (f64::from(k) + 0.5));
-    places.map(|s| (covered(s - moved_px) - covered(s)).powi(2) * step_px).sum()
+    let positions = (0..STEPS).map(|k| from_px + step_px * (f64::from(k) + 0.5));
+    positions.map(|s| (covered(s - moved_px) - covered(s)).powi(2) * step_px).sum()
 }
 
 impl Skyline {

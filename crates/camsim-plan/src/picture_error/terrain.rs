@@ -1,7 +1,7 @@
 //! What it costs that the terrain is drawn coarser than it is.
 //!
 //! What is drawn at a probe lies before or behind the full surface along its ray. The full surface shows the
-//! same place of its picture above or below that: as far as that looks is how far the ground is displaced
+//! same position of its picture above or below that: as far as that looks is how far the ground is displaced
 //! there. In the picture that costs what any displacement does (`misregistration.rs`), and at the ground's
 //! silhouettes the pixels that these then pass over (`silhouettes.rs`), where that is the sky by what is
 //! drawn there itself (`skyline.rs`).

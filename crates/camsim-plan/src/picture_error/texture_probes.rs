@@ -1,4 +1,4 @@
-//! A few places of the image, and all that resampling there depends on: the surface in view, its texture's
+//! A few positions of the image, and all that resampling there depends on: the surface in view, its texture's
 //! spectrum, and the two maps from the texture over the ideal frame to the output pixel.
 
 use camsim_core::{pose::CameraPose, sequence::Sequence, shutter::Shutter, transfer::sinc};
@@ -188,7 +188,7 @@ fn representative(probes: Vec<TextureProbe<'_>>) -> Vec<TextureProbe<'_>> {
 }
 
 impl TextureProbe<'_> {
-    /// Samples of the exposure that are at different places: where a path goes to and fro they may meet.
+    /// Samples of the exposure that are at different positions: where a path goes to and fro they may meet.
     pub fn distinct_samples(&self, samples: u32) -> u32 {
         let sweeps = self.path_px / self.path.length().max(1e-9);
         ((f64::from(samples) / sweeps.max(1.0)).round() as u32).max(1)

@@ -2,8 +2,8 @@
 //!
 //! A texture spectrum is a power spectrum, mean over directions and channels: variance for each square cycle
 //! a texel, in linear light. It is found from the variances that go when 2x2, 4x4, ... texels become one,
-//! which needs no transform: a spectrum is fitted to them. Pictures of real ground differ from place to
-//! place, a lawn beside parked cars, and are often empty in their corners, so that each piece of a texture
+//! which needs no transform: a spectrum is fitted to them. Pictures of real ground vary in
+//! themselves, a lawn beside parked cars, and are often empty in their corners, so that each piece of a texture
 //! has a spectrum of its own, found when first needed.
 
 use std::sync::{Arc, OnceLock};
@@ -20,7 +20,7 @@ const PIECE_PX: u32 = 128;
 const OF_BLOCK: u32 = 4;
 /// Where blocks of texels begin, beside the first texel of a piece: what a person drew mostly has its edges
 /// between blocks that begin there, as a chessboard's are, and loses nothing to them. Each of these is
-/// another place in blocks of 2, 4, 8 and 16.
+/// another position in blocks of 2, 4, 8 and 16.
 const BEGINNINGS: [[u32; 2]; 4] = [[0, 0], [5, 15], [10, 5], [15, 10]];
 /// Frequency that the loss of the finest detail depends on most, cycles a texel; each further level is an
 /// octave lower.
@@ -89,7 +89,7 @@ impl TextureSpectra {
         }
     }
 
-    /// The spectrum about a place of the texture, texels; textures repeat.
+    /// The spectrum about a position of the texture, texels; textures repeat.
     pub fn near(&self, texel: DVec2) -> &TextureSpectrum {
         let size_px = self.texture.size_px;
         let piece = [0, 1].map(|k| {
@@ -143,10 +143,10 @@ impl TextureSpectrum {
                 .map(|(level, v)| v.max(1e-12).ln() + 4_f64.powi(level as i32).ln())
                 .collect(),
         };
-        let places = places(detail);
+        let bands = bands(detail);
         for _ in 0..ROUNDS {
             let mut modelled = vec![0.0; detail];
-            for (frequency, area, fractions) in &places {
+            for (frequency, area, fractions) in &bands {
                 let power = spectrum.density(*frequency) * area;
                 modelled.iter_mut().zip(fractions).for_each(|(sum, fraction)| *sum += fraction * power);
             }
@@ -188,9 +188,9 @@ fn mean(losses: [Vec<f64>; BEGINNINGS.len()]) -> Vec<f64> {
 
 /// Frequencies of a quadrant, the area that each stands for in all four, and the fraction of its power that goes
 /// with each level.
-fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
+fn bands(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
     let octaves = levels as u32 + 2;
-    let mut places = Vec::new();
+    let mut bands = Vec::new();
     for i in 0..octaves * AN_OCTAVE {
         let frequency = 0.5_f64.sqrt() * (-(f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
         for j in 0..DIRECTIONS {
@@ -204,10 +204,10 @@ fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
                 / f64::from(DIRECTIONS);
             let left =
                 |level: usize| (dirichlet(1 << level, cycles.x) * dirichlet(1 << level, cycles.y)).powi(2);
-            places.push((frequency, area, (0..levels).map(|level| left(level) - left(level + 1)).collect()));
+            bands.push((frequency, area, (0..levels).map(|level| left(level) - left(level + 1)).collect()));
         }
     }
-    places
+    bands
 }
 
 /// A piece of a picture in linear light.

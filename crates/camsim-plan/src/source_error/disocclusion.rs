@@ -133,7 +133,7 @@ impl<'a> OffsetCamera<'a> {
         }
     }
 
-    fn place(&self, inverse_depth: f64) -> DVec2 {
+    fn position(&self, inverse_depth: f64) -> DVec2 {
         self.dry_run.ideal.px_from_point(self.direction + inverse_depth * self.shift)
     }
 
@@ -146,7 +146,7 @@ impl<'a> OffsetCamera<'a> {
     fn width_px(&self, inverse_depth: f64, occluder_m: DVec3) -> f64 {
         let depth_m = (occluder_m - self.origin_m).dot(self.axis);
         if depth_m > 0.0 {
-            self.place(depth_m.recip()).distance(self.place(inverse_depth))
+            self.position(depth_m.recip()).distance(self.position(inverse_depth))
         } else {
             f64::INFINITY
         }

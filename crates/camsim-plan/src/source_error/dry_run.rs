@@ -148,16 +148,16 @@ impl DryRun<'_> {
             ..SolverErrors::default()
         };
         let mut depth = self.ideal_depth(detail);
-        let places = self.settle(probe.uv, source.relative, None, &mut depth);
-        outcome.after_look_ups = places.map(off);
+        let positions = self.settle(probe.uv, source.relative, None, &mut depth);
+        outcome.after_look_ups = positions.map(off);
         outcome.after_look_ups[0] = outcome.parallax_px;
         outcome.far_end_inverse_depth = self.key_inverse_depth(probe, source, source.far_end());
         let begun_there =
             self.settle(probe.uv, source.relative, Some(outcome.far_end_inverse_depth), &mut depth).map(off);
         outcome.after_hand_over =
             std::array::from_fn(|n| begun_there[n.saturating_sub(1).max(1)].max(outcome.after_look_ups[n]));
-        let settled_px = places[MAX_LOOK_UPS];
-        outcome.unsettled = places.map(|source_px| source_px.distance(settled_px));
+        let settled_px = positions[MAX_LOOK_UPS];
+        outcome.unsettled = positions.map(|source_px| source_px.distance(settled_px));
         if let Some(twist) = &self.twist {
             let dt_s = source.t_s - self.key_s;
             let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
@@ -182,7 +182,7 @@ impl DryRun<'_> {
         detail: Option<&TerrainDetail<'_>>,
     ) -> [f64; MAX_LOOK_UPS + 1] {
         let mut depth = self.ideal_depth(detail);
-        let places_px = self.settle(
+        let positions_px = self.settle(
             probe.uv,
             self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose),
             None,
@@ -199,7 +199,7 @@ impl DryRun<'_> {
             .filter(|_| is_one_surface)
             .map(at_end_px);
         std::array::from_fn(|n| {
-            let key_depth = n.checked_sub(1).map(|last| depth.inverse_depth(places_px[last]));
+            let key_depth = n.checked_sub(1).map(|last| depth.inverse_depth(positions_px[last]));
             let on_line = |direction, shift| {
                 key_depth.and_then(|known| row_inverse_depth(direction, shift, known)).unwrap_or(0.0)
             };
@@ -284,7 +284,7 @@ impl DryRun<'_> {
         self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + source.inverse_depth * shift)
     }
 
-    /// The places found: after no look-up, after one and so on, the first of which takes the key's
+    /// The positions found: after no look-up, after one and so on, the first of which takes the key's
     /// inverse depth to be `guess`, or that of the plane. The same steps as
     /// [`camsim_core::temporal::reproject`].
     fn settle(
@@ -302,7 +302,7 @@ impl DryRun<'_> {
         let mut source_px = self.ideal.px_from_point(direction + w * shift);
         let mut last_px = DVec2::INFINITY;
         std::array::from_fn(|n| {
-            // A place that gives itself again will do so for ever.
+            // A position that gives itself again will do so for ever.
             if n > 0 && source_px != last_px {
                 last_px = source_px;
                 w = row_inverse_depth(direction, shift, depth.inverse_depth(source_px)).unwrap_or(w);

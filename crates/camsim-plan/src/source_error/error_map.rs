@@ -24,7 +24,7 @@ pub(crate) fn error_map(
     let everywhere_px =
         margins::SOURCE_ERROR * forecast.between_px(method) + forecast.path_miss(method.blur).largest_px;
     // What all probes need is worked out in parallel itself: a thread that waits for its parts would take up
-    // a place that waits for it.
+    // a position that waits for it.
     forecast.prepare(method);
     let known = sources.probes.par_iter().zip(&forecast.errors).enumerate().with_min_len(16).map(
         |(i, (probe, errors))| {

@@ -95,7 +95,7 @@ impl<'a> ExactSources<'a> {
         self.largest(|_, probe| self.dry_run.level_of_detail_px(&probe.source, detail))
     }
 
-    /// How far the drawn terrain is from its place at each source, ideal pixels.
+    /// How far the drawn terrain is from its position at each source, ideal pixels.
     pub fn terrain_px(&self, detail: &TerrainDetail<'_>) -> impl ExactSizeIterator<Item = f64> {
         self.probes.iter().map(|probe| self.dry_run.terrain_px(&probe.source, detail))
     }

@@ -20,9 +20,9 @@ const P99: f64 = 3.035;
 const LENS_ROUNDINGS: f64 = 4.0;
 /// Roundings of a component of `R d + w t`: three entries of R, three products, three sums, in quadrature.
 const ROTATION_ROUNDINGS: f64 = 3.0;
-/// Squared roundings of a place from the principal point: 1 / z, its product with x, with 1 - t_z w and with
+/// Squared roundings of a position from the principal point: 1 / z, its product with x, with 1 - t_z w and with
 /// f, that factor itself, and the sum with w t (`source_of_depth` of the shader, which has the most).
-const PLACE_ROUNDINGS2: f64 = 6.0;
+const POSITION_ROUNDINGS2: f64 = 6.0;
 /// Relative roundings of an inverse depth: rasterised, blended, and solved for.
 const DEPTH_ROUNDINGS: f64 = 8.0;
 /// Where the paper's Gauss-Newton inverse stops, output pixels.
@@ -62,14 +62,16 @@ impl Rounding {
         };
         let from_centre = at_px - ideal.principal_px;
         // The last one is the sum with the principal point.
-        let place_px = (PLACE_ROUNDINGS2 * from_centre.length_squared() + at_px.length_squared()).sqrt();
+        let position_px =
+            (POSITION_ROUNDINGS2 * from_centre.length_squared() + at_px.length_squared()).sqrt();
         let slant = (1.0 + (from_centre / ideal.focal_px).length_squared()).sqrt();
         let turned_px = match temporal {
             TemporalStage::Identity => 0.0,
             _ => ROTATION_ROUNDINGS * focal_px * slant,
         };
         let depth_px = DEPTH_ROUNDINGS * parallax_px;
-        let format_px = UNIT * (place_px * place_px + turned_px * turned_px + depth_px * depth_px).sqrt();
+        let format_px =
+            UNIT * (position_px * position_px + turned_px * turned_px + depth_px * depth_px).sqrt();
         Self { lens_px, format_px: P99 * format_px }
     }
 

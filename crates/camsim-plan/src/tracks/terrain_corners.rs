@@ -112,12 +112,12 @@ fn seen_corners(
     });
     let rows = (first[1]..=part.high[1]).step_by(step as usize);
     let corners = rows.flat_map(|j| (first[0]..=part.high[0]).step_by(step as usize).map(move |i| [i, j]));
-    let with_place = corners.filter_map(|corner| Some((corner, place(terrain, corner)?)));
-    views.seen(surfaces, with_place.collect(), |(_, at_ned_m)| WorldPoint::At(*at_ned_m))
+    let with_position = corners.filter_map(|corner| Some((corner, position(terrain, corner)?)));
+    views.seen(surfaces, with_position.collect(), |(_, at_ned_m)| WorldPoint::At(*at_ned_m))
 }
 
-/// Place of a corner of the terrain's grid; `None` for one without a height.
-fn place(terrain: &Terrain, corner: [u32; 2]) -> Option<DVec3> {
+/// Position of a corner of the terrain's grid; `None` for one without a height.
+fn position(terrain: &Terrain, corner: [u32; 2]) -> Option<DVec3> {
     let cell = [0, 1].map(|k| corner[k].min(terrain.cells[k] - 1));
     let (chunk, inside) = terrain.chunk_of_cell(cell);
     let [i, j] = [0, 1].map(|k| inside[k] + corner[k] - cell[k]);

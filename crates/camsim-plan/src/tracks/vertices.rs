@@ -21,7 +21,7 @@ const CORNERS_A_POINT: usize = 16;
 const MORE: usize = 8;
 /// Looks of one try through all cameras, at most, unless the first try needs more.
 const MOST_LOOKS: usize = 100_000_000;
-/// Bits of each coordinate of a place on the Z-order curve.
+/// Bits of each coordinate of a position on the Z-order curve.
 const BITS: u32 = 20;
 
 /// A corner of a mesh.
@@ -74,16 +74,16 @@ fn used_vertices(scene: &Scene, first: usize) -> Vec<Arc<Vec<u32>>> {
     scene.meshes.iter().skip(first).map(of_mesh).collect()
 }
 
-/// Every `step`-th corner, without those at a place that another has which moves, or stands, with it.
+/// Every `step`-th corner, without those at a position that another has which moves, or stands, with it.
 fn distinct(scene: &Scene, first: usize, used: &[Arc<Vec<u32>>], step: usize) -> Vec<Corner> {
     let all = (first..).zip(used).flat_map(|(mesh, used)| used.iter().map(move |&vertex| (mesh, vertex)));
     let mut known = HashSet::new();
     let corner = |(mesh, vertex): (usize, u32)| {
         let position_ned_m = scene.meshes[mesh].position_ned_m(vertex);
         // 0 and -0 are equal.
-        let place = position_ned_m.to_array().map(|value| (value + 0.0).to_bits());
+        let bits = position_ned_m.to_array().map(|value| (value + 0.0).to_bits());
         let motion = scene.meshes[mesh].motion.as_ref().map(Arc::as_ptr);
-        known.insert((place, motion)).then_some(Corner { mesh, vertex, position_ned_m })
+        known.insert((bits, motion)).then_some(Corner { mesh, vertex, position_ned_m })
     };
     all.step_by(step).filter_map(corner).collect()
 }
@@ -94,12 +94,12 @@ fn along_curve(mut corners: Vec<Corner>) -> Vec<Corner> {
     corners.iter().for_each(|corner| bounds.include(corner.position_ned_m));
     let size_m = (bounds.max - bounds.min).max_element().max(f64::MIN_POSITIVE);
     let scale = f64::from((1_u32 << BITS) - 1) / size_m;
-    let place = |corner: &Corner| {
+    let order = |corner: &Corner| {
         let whole = ((corner.position_ned_m - bounds.min) * scale).to_array().map(|value| value as u64);
         let bit = |b: u32, k: u32| ((whole[k as usize] >> b) & 1) << (3 * b + k);
         (0..BITS).flat_map(|b| (0..3).map(move |k| (b, k))).map(|(b, k)| bit(b, k)).sum::<u64>()
     };
-    corners.sort_by_cached_key(|corner| (place(corner), corner.mesh, corner.vertex));
+    corners.sort_by_cached_key(|corner| (order(corner), corner.mesh, corner.vertex));
     corners
 }
 

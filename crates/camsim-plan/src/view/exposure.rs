@@ -1,4 +1,4 @@
-//! Where over the exposure a source's path is known exactly, and what joins those places.
+//! Where over the exposure a source's path is known exactly, and what joins those positions.
 
 use camsim_core::{
     mount::CameraPath,
@@ -177,12 +177,12 @@ impl ExposedFrame<'_> {
                 };
                 let poses: Vec<(DMat3, DVec3)> = (0..=halves).map(pose).collect();
                 for w in [0.0, 1.0 / self.motion.nearest_m] {
-                    let place = |(rotation, shift): &(DMat3, DVec3)| {
+                    let position = |(rotation, shift): &(DMat3, DVec3)| {
                         let p = *rotation * uv.extend(1.0) + w * *shift;
                         (p.z > 0.02).then(|| self.focal_px * p.truncate() / p.z)
                     };
-                    let places: Option<Vec<DVec2>> = poses.iter().map(place).collect();
-                    worst = worst.max(places.map_or(0.0, |places| miss_of(&places)));
+                    let positions: Option<Vec<DVec2>> = poses.iter().map(position).collect();
+                    worst = worst.max(positions.map_or(0.0, |positions| miss_of(&positions)));
                 }
             }
         }
@@ -207,33 +207,33 @@ pub(crate) fn miss_at_px(
     path: PathStage,
     stretches: u32,
     fraction: f64,
-    mut place: impl FnMut(f64) -> DVec2,
+    mut position: impl FnMut(f64) -> DVec2,
 ) -> f64 {
     let along = fraction * f64::from(stretches);
     let k = along.floor().min(f64::from(stretches) - 1.0);
     let node = |j: u32| (k + f64::from(j) / f64::from(path.steps())) / f64::from(stretches);
-    let nodes: Vec<DVec2> = (0..=path.steps()).map(|j| place(node(j))).collect();
-    let px = Curve::through(&nodes).at((along - k) * f64::from(path.steps())).distance(place(fraction));
+    let nodes: Vec<DVec2> = (0..=path.steps()).map(|j| position(node(j))).collect();
+    let px = Curve::through(&nodes).at((along - k) * f64::from(path.steps())).distance(position(fraction));
     if px.is_finite() { px } else { 0.0 }
 }
 
 /// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a
 /// fraction of the exposure (0 to 1).
-pub(crate) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl FnMut(f64) -> DVec2) -> f64 {
+pub(crate) fn miss_px(path: PathStage, stretches: u32, k: u32, position: impl FnMut(f64) -> DVec2) -> f64 {
     let halves = 2 * path.steps();
     let fraction = |half: u32| (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
-    let places: Vec<DVec2> = (0..=halves).map(fraction).map(place).collect();
-    let miss_px = miss_of(&places);
+    let positions: Vec<DVec2> = (0..=halves).map(fraction).map(position).collect();
+    let miss_px = miss_of(&positions);
     if miss_px.is_finite() { miss_px } else { 0.0 }
 }
 
-/// How far the polynomial through every second place is from the places between them, where it is off by at
+/// How far the polynomial through every second position is from the positions between them, where it is off by at
 /// least nine tenths of the most that it is.
-fn miss_of(places: &[DVec2]) -> f64 {
-    let nodes: Vec<DVec2> = places.iter().copied().step_by(2).collect();
+fn miss_of(positions: &[DVec2]) -> f64 {
+    let nodes: Vec<DVec2> = positions.iter().copied().step_by(2).collect();
     let curve = Curve::through(&nodes);
-    let between = places.iter().enumerate().skip(1).step_by(2);
-    between.map(|(half, place)| curve.at(0.5 * half as f64).distance(*place)).fold(0.0, f64::max)
+    let between = positions.iter().enumerate().skip(1).step_by(2);
+    between.map(|(half, position)| curve.at(0.5 * half as f64).distance(*position)).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -297,8 +297,8 @@ mod tests {
             for k in 0..stretches {
                 let at = |t: f64| swing((f64::from(k) + t / f64::from(steps)) / f64::from(stretches));
                 let curve = Curve::through(&(0..=steps).map(|j| at(f64::from(j))).collect::<Vec<_>>());
-                let places = (0..=1000).map(|i| f64::from(steps * i) / 1000.0);
-                largest = places.map(|t| curve.at(t).distance(at(t))).fold(largest, f64::max);
+                let positions = (0..=1000).map(|i| f64::from(steps * i) / 1000.0);
+                largest = positions.map(|t| curve.at(t).distance(at(t))).fold(largest, f64::max);
             }
             assert!(found <= largest && found > 0.85 * largest, "{path:?}: {found:.3e} of {largest:.3e}");
         }

@@ -1,4 +1,4 @@
-//! Size and place of the ideal frame: a bound on the sources that the output frame needs.
+//! Size and position of the ideal frame: a bound on the sources that the output frame needs.
 
 use camsim_core::{
     camera::CameraModel,
@@ -52,7 +52,7 @@ impl IdealExtent {
 /// What an ideal frame must show to hold every source of the frame: each kept ray at its own row's instants
 /// (start, middle and end of the exposure), at infinity and at the nearest depth in view, in the two keys
 /// that are nearest in time. A solver of `constant_twist` also looks where the point is not: there too,
-/// and at the ray's own place, where it reads the depth.
+/// and at the ray's own position, where it reads the depth.
 pub(crate) fn ideal_extent(
     reach: &LensReach,
     path: &CameraPath,

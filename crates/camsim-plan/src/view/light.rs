@@ -41,8 +41,8 @@ struct PaneHits {
 
 impl PaneHits {
     fn add(&mut self, pane: PaneHit) {
-        let place = self.nearest_first.partition_point(|other| other.t <= pane.t);
-        self.nearest_first.insert(place, pane);
+        let index = self.nearest_first.partition_point(|other| other.t <= pane.t);
+        self.nearest_first.insert(index, pane);
         let mut left = 1.0;
         let hides = |pane: &PaneHit| {
             left *= 1.0 - pane.alpha;

@@ -92,7 +92,7 @@ fn blur_path(
         let (mid_s, exposure_s) = (stamp_s + shutter.dt_pixel_s(x, y), shutter.exposure_pixel_s(x, y));
         let mid = path.pose(mid_s);
         for w in [0.0, inverse_near] {
-            let places: Vec<DVec2> = (0..=steps)
+            let positions: Vec<DVec2> = (0..=steps)
                 .filter_map(|k| {
                     let t_s = mid_s + exposure_s * (f64::from(k) / f64::from(steps) - 0.5);
                     let (rotation, shift) = path.pose(t_s).relative_to(&mid);
@@ -100,10 +100,10 @@ fn blur_path(
                     (p.z > 0.02).then(|| ideal.focal_px * p.truncate() / p.z)
                 })
                 .collect();
-            longest = longest.max(places.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
-            if let (Some(&a), Some(&b)) = (places.first(), places.last()) {
-                let last = (places.len() - 1).max(1) as f64;
-                let miss = places
+            longest = longest.max(positions.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
+            if let (Some(&a), Some(&b)) = (positions.first(), positions.last()) {
+                let last = (positions.len() - 1).max(1) as f64;
+                let miss = positions
                     .iter()
                     .enumerate()
                     .map(|(k, p)| p.distance(a.lerp(b, k as f64 / last)))

@@ -25,7 +25,7 @@ mod tests {
 
     use super::*;
 
-    fn places() -> impl Iterator<Item = DVec2> {
+    fn rays() -> impl Iterator<Item = DVec2> {
         (0..30).map(|i| DVec2::new(f64::from(i % 6) * 0.2 - 0.5, f64::from(i / 6) * 0.2 - 0.4))
     }
 
@@ -36,7 +36,7 @@ mod tests {
             ned_from_camera: DQuat::from_rotation_x(0.3),
         };
         let normal = DVec3::new(2e-4, -3e-4, 1e-3);
-        let plane = fit(camera, places().map(|uv| (uv, normal.dot(uv.extend(1.0)))));
+        let plane = fit(camera, rays().map(|uv| (uv, normal.dot(uv.extend(1.0)))));
         assert!((plane.normal_per_m - normal).length() < 1e-15, "{plane:?}");
         let other = CameraPose {
             position_ned_m: camera.position_ned_m + DVec3::new(40.0, 7.0, -20.0),
@@ -44,7 +44,7 @@ mod tests {
         };
         let elsewhere = plane.seen_from(&other);
         let (rotation, shift) = other.relative_to(&camera);
-        for uv in places() {
+        for uv in rays() {
             let there = uv.extend(1.0) / elsewhere.dot(uv.extend(1.0));
             assert!((normal.dot(rotation * there + shift) - 1.0).abs() < 1e-12, "{uv}");
         }

@@ -29,7 +29,7 @@ pub(crate) struct Probe {
     pub is_low: bool,
 }
 
-/// One probe a cell of a grid over the image, at a place of its own in each, and the image's corners; only
+/// One probe a cell of a grid over the image, at a position of its own in each, and the image's corners; only
 /// pixels that have a ray.
 pub(crate) fn probes(camera: &CameraModel) -> Vec<Probe> {
     let [width, height] = camera.size_px;

@@ -60,7 +60,7 @@ pub(crate) struct SurfaceHit {
     pub tint: DVec3,
     /// Unit normal of the triangle, NED, of either sign.
     pub normal_ned: DVec3,
-    /// The place on the terrain, if it is that.
+    /// The position on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
 }
 
@@ -315,7 +315,7 @@ impl Surfaces {
         }
     }
 
-    /// Place in the picture on what a ray met, texels.
+    /// Position in the picture on what a ray met, texels.
     pub fn texel(&self, hit: &SurfaceHit) -> DVec2 {
         let texture = self.texture(hit);
         texture.map_or(DVec2::ZERO, |texture| {

@@ -49,7 +49,7 @@ fn row_mid_s(shutter: &ShutterSpec, y: f64, rows: f64) -> f64 {
 }
 
 /// Frame 3 of a flight over the plane z = 0: the ideal rays of a grid, imaged by the formula, must be the
-/// rays that the oracle finds at those places, meet the plane where the line of sight does, and lie in the
+/// rays that the oracle finds at those positions, meet the plane where the line of sight does, and lie in the
 /// key frame where the plane's homography says.
 fn check(name: &str, scenario: &Scenario, motion: Steady, reach: f64) {
     let camera = &scenario.camera;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::fixtures::{Steady, plane, rolling, scenario, sequence, tangential, town};
 
-/// Places along each side of a pixel of the reference, each at an instant of its own.
+/// Positions along each side of a pixel of the reference, each at an instant of its own.
 const SIDE: u32 = 96;
 
 fn camera() -> Scenario {
@@ -33,13 +33,13 @@ fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
         let count = SIDE * SIDE;
         let sum: DVec3 = (0..count)
             .map(|k| {
-                let place =
+                let position =
                     (DVec2::new(f64::from(k % SIDE), f64::from(k / SIDE)) + 0.5) / f64::from(SIDE) - 0.5;
                 // 5701 is prime to the count.
                 let phase = (f64::from((u64::from(k) * 5701 % u64::from(count)) as u32) + 0.5)
                     / f64::from(count)
                     - 0.5;
-                let look = view.sample([i % width, i / width], place, phase).unwrap();
+                let look = view.sample([i % width, i / width], position, phase).unwrap();
                 oracle.color(look.uv, look.hit.as_ref())
             })
             .sum();

@@ -101,9 +101,9 @@ pub fn hills(side: u32, cell_m: f64) -> Terrain {
 /// Boxes on a plane.
 pub fn town(count: usize) -> Scene {
     let mut scene = plane(4000.0);
-    let mut places = (0..).map(|i| (f64::from(i) * 0.618_033_988_749_894_9 + 0.1_f64).fract());
+    let mut numbers = (0..).map(|i| (f64::from(i) * 0.618_033_988_749_894_9 + 0.1_f64).fract());
     for _ in 0..count {
-        let [n, e, w, h] = [0; 4].map(|_: i32| places.next().unwrap());
+        let [n, e, w, h] = [0; 4].map(|_: i32| numbers.next().unwrap());
         scene.meshes.push(block(
             DVec3::new(800.0 * (n - 0.5), 800.0 * (e - 0.5), 0.0),
             5.0 + 15.0 * w,

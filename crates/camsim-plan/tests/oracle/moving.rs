@@ -81,7 +81,7 @@ fn spin(hub_m: DVec3, axis: DVec3, hz: f64, phase_rad: f64) -> Joint {
     Joint::new(frame, Track::Spin { axis, hz, phase_rad })
 }
 
-/// Whether a place of frame 1 shows anything at an exposure phase. `x_px` may be within any pixel of the row.
+/// Whether a position of frame 1 shows anything at an exposure phase. `x_px` may be within any pixel of the row.
 fn sees(oracle: &Oracle, x_px: f64, y: u32, phase: f64) -> bool {
     let pixel = x_px.round().clamp(0.0, f64::from(SIZE_PX[0] - 1));
     let sample = oracle.view(1).sample([pixel as u32, y], DVec2::new(x_px - pixel, 0.0), phase);

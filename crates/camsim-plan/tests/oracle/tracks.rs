@@ -51,10 +51,10 @@ fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
     });
     change(&mut scenario);
     let terrain = hills(120, 8.0);
-    let place = |k: usize, step: f64| (k as f64 * step + 0.3).fract() - 0.5;
+    let position = |k: usize, step: f64| (k as f64 * step + 0.3).fract() - 0.5;
     let motion = motion();
     let houses = (0..60).map(|k| {
-        let (n, e) = (500.0 * place(k, 0.618_034), 500.0 * place(k, 0.414_214));
+        let (n, e) = (500.0 * position(k, 0.618_034), 500.0 * position(k, 0.414_214));
         let down = terrain.down_at(n, e).unwrap_or(0.0);
         let house = block(DVec3::new(n, e, down), 6.0, 4.0 + (k % 9) as f64);
         Mesh { motion: (k % 3 == 0).then(|| motion.clone()), ..house }
@@ -64,9 +64,9 @@ fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
         source: "p.csv".into(),
         name: k.to_string(),
         position_ned_m: DVec3::new(
-            700.0 * place(k, 0.618_034),
-            700.0 * place(k, 0.414_214),
-            80.0 * place(k, 0.732_051),
+            700.0 * position(k, 0.618_034),
+            700.0 * position(k, 0.414_214),
+            80.0 * position(k, 0.732_051),
         ),
         moves_with: None,
     });
@@ -173,10 +173,10 @@ fn points_are_those_that_frames_see_without_repeats() {
     for source in ["terrain", "vertices"] {
         let points = of(source);
         assert!(points.len() > 50 && points.len() <= 300, "{source}: {}", points.len());
-        let places: BTreeSet<[u64; 3]> =
+        let positions: BTreeSet<[u64; 3]> =
             points.iter().map(|point| point.position_ned_m.to_array().map(f64::to_bits)).collect();
         let names: BTreeSet<&String> = points.iter().map(|point| &point.name).collect();
-        assert_eq!((places.len(), names.len()), (points.len(), points.len()), "{source}");
+        assert_eq!((positions.len(), names.len()), (points.len(), points.len()), "{source}");
     }
     // The terrain's corners are on one grid.
     let columns = |k: usize| {

@@ -29,7 +29,7 @@ pub struct ImuSpec {
     /// Samples per second.
     #[key(default = 200.0, unit = "Hz", above = 0.0, max = MAX_RATE_HZ, hint = "give samples a second")]
     pub rate_hz: f64,
-    /// Place and orientation on the platform.
+    /// Position and orientation on the platform.
     pub mount: SensorMountSpec,
     /// What the mount is fixed to. Its angles and lever arm are those without vibration.
     pub attached_to: SensorCarrier,

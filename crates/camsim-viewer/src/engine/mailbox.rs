@@ -22,7 +22,7 @@ impl<T> Default for Mailbox<T> {
 }
 
 impl<T> Mailbox<T> {
-    /// Puts a request in, in place of one that has not been taken.
+    /// Puts a request in, instead of one that has not been taken.
     pub fn put(&self, request: T) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).request = Some(request);
         self.arrived.notify_one();

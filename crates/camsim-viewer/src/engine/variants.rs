@@ -64,8 +64,8 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
     let centre = [0.5 * (width - 1.0), 0.5 * (height - 1.0)];
     let focal = |focal_px: [f64; 2]| focal_px.map(|f| f / scale);
     // The outer border stays in place: the centre of a small pixel is the centre of the pixels it replaces.
-    let place = |point_px: [f64; 2]| point_px.map(|c| (c + 0.5) / scale - 0.5);
-    let principal = |point_px: Option<[f64; 2]>| Some(place(point_px.unwrap_or(centre)));
+    let scaled = |point_px: [f64; 2]| point_px.map(|c| (c + 0.5) / scale - 0.5);
+    let principal = |point_px: Option<[f64; 2]>| Some(scaled(point_px.unwrap_or(centre)));
     camera.size_px = camera.size_px.map(|side| side.div_ceil(factor));
     camera.focal_px = focal(camera.focal_px);
     camera.principal_point_px = principal(camera.principal_point_px);
@@ -85,11 +85,11 @@ fn shrink(camera: &mut CameraSpec, factor: u32) {
         camera.chromatic.iter_mut().flat_map(|chromatic| [&mut chromatic.red, &mut chromatic.blue]).flatten()
     {
         lens.focal_px = lens.focal_px.map(focal);
-        lens.principal_point_px = lens.principal_point_px.map(place);
+        lens.principal_point_px = lens.principal_point_px.map(scaled);
     }
     if let Some(circle) = &mut camera.image_circle {
         circle.radius_px = circle.radius_px.map(|radius_px| radius_px / scale);
-        circle.centre_px = circle.centre_px.map(place);
+        circle.centre_px = circle.centre_px.map(scaled);
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) struct SensorFacts<'a> {
     name: &'a str,
     rate_hz: f64,
     samples: u64,
-    /// In body axes; an imu on the camera shakes about this place.
+    /// In body axes; an imu on the camera shakes about this position.
     offset_m: [f64; 3],
     /// Whether it is part of the camera, with its vibration.
     is_on_camera: bool,

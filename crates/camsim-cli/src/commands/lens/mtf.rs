@@ -22,7 +22,7 @@ pub(super) struct MtfArgs {
     /// 12233), beside the model's
     #[arg(long)]
     mtf: bool,
-    /// Measure this picture of a slanted edge in place of the rendered one: EXR, or PNG or TIFF, encoded as
+    /// Measure this picture of a slanted edge instead of the rendered one: EXR, or PNG or TIFF, encoded as
     /// sRGB
     #[arg(long, value_name = "PICTURE", requires = "mtf")]
     picture: Option<PathBuf>,

@@ -42,7 +42,7 @@ pub struct Part<'p> {
     pub folder: &'p Path,
     /// Which variation it is.
     pub variation: Option<VariationRecord>,
-    /// The dataset for which it is rendered, in place of its own.
+    /// The dataset for which it is rendered, instead of its own.
     pub export: Option<DatasetFormat>,
     /// The fraction of its frames.
     pub shard: Option<Shard>,

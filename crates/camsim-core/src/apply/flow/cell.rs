@@ -15,7 +15,7 @@ const RIM_PX: f64 = 0.02;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     /// Position of the first pixel.
-    pub(super) place_px: DVec2,
+    pub(super) origin_px: DVec2,
     pub(super) flows: [DVec2; 4],
     /// Tears of the upper and the lower edge, pixels of the flow.
     pub(super) across: [f64; 2],
@@ -44,7 +44,7 @@ impl Cell {
             let slope = self.slope(corner, fraction);
             let forward = DMat2::IDENTITY + slope * fraction;
             let from_corner =
-                forward.inverse() * (position_px - self.place_px - corner - fraction * self.flows[k]);
+                forward.inverse() * (position_px - self.origin_px - corner - fraction * self.flows[k]);
             // Each pixel covers its half of the way to each neighbour. A torn edge has no overlap, because
             // the nearest pixel beyond belongs to another object.
             let [is_whole_across, is_whole_down] = self.intact_edges(corner, fraction);
@@ -75,7 +75,7 @@ impl Cell {
             return;
         }
         for within in self.roots(position_px, fraction) {
-            let ranks = [0, 1, 2, 3].map(|k| (k, rank(self.place_px + corner(k))));
+            let ranks = [0, 1, 2, 3].map(|k| (k, rank(self.origin_px + corner(k))));
             // A pixel with unknown flow is used only if no other exists.
             let best_known = ranks.iter().fold(0.0_f64, |most, (_, rank)| most.max(rank[0]));
             let farthest = ranks
@@ -87,7 +87,7 @@ impl Cell {
             let [is_whole_across, is_whole_down] = self.intact_edges(corner, fraction);
             let x = if is_whole_across { within.x } else { corner.x };
             let y = if is_whole_down { within.y } else { corner.y };
-            found(rank, self.place_px + DVec2::new(x, y));
+            found(rank, self.origin_px + DVec2::new(x, y));
         }
     }
 
@@ -135,7 +135,7 @@ impl Cell {
     /// solutions. Eliminating u gives `(q - v g) x (e + v h) = 0`, a quadratic in v.
     fn roots(&self, position_px: DVec2, fraction: f64) -> impl Iterator<Item = DVec2> {
         let [a, b, c, d] = self.flows;
-        let q = position_px - self.place_px - fraction * a;
+        let q = position_px - self.origin_px - fraction * a;
         let e = DVec2::X + fraction * (b - a);
         let g = DVec2::Y + fraction * (c - a);
         let h = fraction * ((a - b) + (d - c));

@@ -72,7 +72,7 @@ impl Grid {
             if is_ring { 0.0 } else { f64::from(self.tears[(y * width + x) as usize][way]) }
         };
         Cell {
-            place_px: DVec2::new(f64::from(column) - 1.0, f64::from(row) - 1.0),
+            origin_px: DVec2::new(f64::from(column) - 1.0, f64::from(row) - 1.0),
             flows: [(0, 0), (1, 0), (0, 1), (1, 1)]
                 .map(|(i, j)| self.corner([x[i], y[j]], [column + i as u32, row + j as u32])),
             across: [0, 1].map(|k: usize| tear(x[0], y[k], 0, x[0] == x[1])),
@@ -108,7 +108,7 @@ impl Grid {
         let most = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1]));
         let index = (position_px.floor() + 1.0).clamp(DVec2::ZERO, most);
         let cell = self.cell(index.x as u32, index.y as u32);
-        (cell, (position_px - cell.place_px).clamp(DVec2::ZERO, DVec2::ONE))
+        (cell, (position_px - cell.origin_px).clamp(DVec2::ZERO, DVec2::ONE))
     }
 }
 

@@ -175,7 +175,7 @@ impl Fourier {
     }
 }
 
-/// Whether a place in the margin is beyond the last pixel, and not before the first one: pictures repeat.
+/// Whether a position in the margin is beyond the last pixel, and not before the first one: pictures repeat.
 fn is_after(at: usize, size: usize, grid: usize) -> bool {
     at < size + (grid - size) / 2
 }

@@ -99,11 +99,11 @@ impl SpreadKernel {
     }
 }
 
-/// `exp(-2 pi i f x)` of each frequency at the places of `count` values about their middle.
+/// `exp(-2 pi i f x)` of each frequency at the positions of `count` values about their middle.
 fn phases(frequencies: &[f64], step_px: f64, count: usize) -> Vec<Vec<Complex64>> {
-    let place = |i: usize| step_px * (i as f64 - 0.5 * (count as f64 - 1.0));
+    let position = |i: usize| step_px * (i as f64 - 0.5 * (count as f64 - 1.0));
     let of = |frequency: f64| {
-        let phase = move |i: usize| match Complex64::cis(-TAU * frequency * place(i)) {
+        let phase = move |i: usize| match Complex64::cis(-TAU * frequency * position(i)) {
             phase if frequency.abs() == 0.5 => Complex64::new(phase.re, 0.0),
             phase => phase,
         };

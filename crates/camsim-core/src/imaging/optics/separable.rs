@@ -78,8 +78,8 @@ fn taps(sigma_px: f64) -> Vec<f32> {
             (-2.0 * (PI * sigma_px * cycles.min(1.0 - cycles)).powi(2)).exp()
         })
         .collect();
-    let tap = |place: usize| {
-        let wave = |i: usize| (TAU * ((i * place) % SPECTRUM as usize) as f64 / f64::from(SPECTRUM)).cos();
+    let tap = |offset: usize| {
+        let wave = |i: usize| (TAU * ((i * offset) % SPECTRUM as usize) as f64 / f64::from(SPECTRUM)).cos();
         spectrum.iter().enumerate().map(|(i, value)| value * wave(i)).sum::<f64>() / f64::from(SPECTRUM)
     };
     let half: Vec<f64> = (0..=radius).map(tap).collect();

@@ -67,10 +67,11 @@ fn waves_lose_what_the_closed_forms_say() {
         for diameter_px in [1.5, 6.0] {
             // The mean of the wave over a disc, in rings.
             let steps = 400;
-            let place = |i: i32| diameter_px * ((f64::from(i) + 0.5) / f64::from(steps) - 0.5);
+            let position = |i: i32| diameter_px * ((f64::from(i) + 0.5) / f64::from(steps) - 0.5);
             let chord = |x: f64| (0.25 * diameter_px * diameter_px - x * x).sqrt();
-            let sum: f64 = (0..steps).map(|i| chord(place(i)) * (TAU * square.sqrt() * place(i)).cos()).sum();
-            let expected = sum / (0..steps).map(|i| chord(place(i))).sum::<f64>();
+            let sum: f64 =
+                (0..steps).map(|i| chord(position(i)) * (TAU * square.sqrt() * position(i)).cos()).sum();
+            let expected = sum / (0..steps).map(|i| chord(position(i))).sum::<f64>();
             let found = left_of_wave(disc(diameter_px), cycles_px);
             assert!((found - expected).abs() < 2e-3, "{diameter_px} {cycles_px:?}: {found} {expected}");
         }

@@ -26,7 +26,7 @@ impl Grid {
         let step = (high - low) / CELLS as f64;
         let node = |k: usize| {
             let at = low + step * DVec2::new((k % (CELLS + 1)) as f64, (k / (CELLS + 1)) as f64);
-            lens.ray(at).map_or(DVec2::NAN, |ray| formula.place(ray))
+            lens.ray(at).map_or(DVec2::NAN, |ray| formula.position(ray))
         };
         let nodes = (0..(CELLS + 1) * (CELLS + 1)).into_par_iter().map(node).collect();
         Self { low, cells_per_unit: step.recip(), nodes, inside }
@@ -58,13 +58,13 @@ impl Grid {
     }
 }
 
-/// The cell of a place along a side, and the fraction of it, NaN outside. Without a conversion that saturates, so that
+/// The cell of a position along a side, and the fraction of it, NaN outside. Without a conversion that saturates, so that
 /// it becomes vector instructions.
 #[inline(always)]
-fn cell(place: f64) -> (u64, f64) {
+fn cell(position: f64) -> (u64, f64) {
     /// Added to a small number, it leaves the nearest integer in the lowest bits.
     const ROUND: f64 = (3_u64 << 51) as f64;
-    let is_inside = (place >= 0.0) & (place < CELLS as f64);
-    let cell = if is_inside { place - 0.5 } else { 0.0 } + ROUND;
-    (cell.to_bits() & (CELLS as u64 - 1), if is_inside { place - (cell - ROUND) } else { f64::NAN })
+    let is_inside = (position >= 0.0) & (position < CELLS as f64);
+    let cell = if is_inside { position - 0.5 } else { 0.0 } + ROUND;
+    (cell.to_bits() & (CELLS as u64 - 1), if is_inside { position - (cell - ROUND) } else { f64::NAN })
 }

@@ -20,7 +20,7 @@ pub(in crate::lens) trait PlaneFormula: Sync {
     fn value_and_jacobian(&self, at: DVec2) -> (DVec2, DMat2);
 
     /// The point of a ray of any length.
-    fn place(&self, ray: DVec3) -> DVec2;
+    fn position(&self, ray: DVec3) -> DVec2;
 
     /// A ray of a point, of any length.
     fn ray(&self, at: DVec2) -> DVec3;

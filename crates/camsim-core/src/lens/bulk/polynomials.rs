@@ -13,7 +13,7 @@ const TESTED: [f64; 6] = [-1.0, -0.92, -0.45, 0.12, 0.64, 1.0];
 #[derive(Clone, Debug)]
 pub(super) struct Polynomials {
     cells_per_unit: f64,
-    /// Powers of the place in the cell, -1 to 1. NaN: a cell without a polynomial, such as the one beyond the end.
+    /// Powers of the position in the cell, -1 to 1. NaN: a cell without a polynomial, such as the one beyond the end.
     cells: Vec<[f64; TERMS]>,
 }
 
@@ -21,7 +21,7 @@ impl Polynomials {
     /// Through the function's values at Chebyshev's nodes of each cell.
     pub(super) fn new(end: f64, function: impl Fn(f64) -> f64) -> Self {
         let width = end / CELLS as f64;
-        let cell = |i: usize| fit(|place| function((i as f64 + 0.5 + 0.5 * place) * width));
+        let cell = |i: usize| fit(|position| function((i as f64 + 0.5 + 0.5 * position) * width));
         let cells = (0..CELLS).map(cell).chain([[f64::NAN; TERMS]]).collect();
         Self { cells_per_unit: width.recip(), cells }
     }
@@ -29,9 +29,9 @@ impl Polynomials {
     /// The value; NaN outside.
     #[inline]
     pub(super) fn at(&self, x: f64) -> f64 {
-        let place = x * self.cells_per_unit;
-        let i = (place as usize).min(CELLS);
-        let local = 2.0 * (place - i as f64) - 1.0;
+        let position = x * self.cells_per_unit;
+        let i = (position as usize).min(CELLS);
+        let local = 2.0 * (position - i as f64) - 1.0;
         let [c0, c1, c2, c3, c4, c5, c6, c7] = self.cells[i];
         let square = local * local;
         let (low, high) =
@@ -39,15 +39,15 @@ impl Polynomials {
         low + high * (square * square)
     }
 
-    /// Removes cells in which any of some places fails a test.
+    /// Removes cells in which any of some positions fails a test.
     pub(super) fn keep(&mut self, is_good: impl Fn(&Self, f64) -> bool) {
         for i in 0..CELLS {
-            let place = |local: f64| {
+            let position = |local: f64| {
                 // Not the first of the next cell.
                 let fraction = (0.5 + 0.5 * local).clamp(1e-9, 1.0 - 1e-9);
                 (i as f64 + fraction) / self.cells_per_unit
             };
-            if !TESTED.iter().all(|local| is_good(self, place(*local))) {
+            if !TESTED.iter().all(|local| is_good(self, position(*local))) {
                 self.cells[i] = [f64::NAN; TERMS];
             }
         }

@@ -62,7 +62,7 @@ pub(super) fn chessboard(columns: u32, rows: u32, square_m: DVec2) -> Layout {
 /// Circles `spacing_m` apart. In an asymmetric grid, circles of one row are two spacings apart, and every
 /// other row is shifted by one spacing.
 pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, asymmetric: bool) -> Layout {
-    let place = |i: u32, j: u32| match asymmetric {
+    let position = |i: u32, j: u32| match asymmetric {
         true => DVec2::new(count(2 * i + j % 2), count(j)),
         false => DVec2::new(count(i), count(j)),
     };
@@ -71,8 +71,10 @@ pub(super) fn circles(columns: u32, rows: u32, spacing_m: f64, diameter_m: f64, 
         count(rows - 1),
     );
     let radius_m = 0.5 * diameter_m;
-    let point =
-        |id: u32| BoardPoint { id, position_m: spacing_m * (place(id % columns, id / columns) - 0.5 * last) };
+    let point = |id: u32| BoardPoint {
+        id,
+        position_m: spacing_m * (position(id % columns, id / columns) - 0.5 * last),
+    };
     let points: Vec<BoardPoint> = (0..columns * rows).map(point).collect();
     let high_m = 0.5 * spacing_m * last + radius_m;
     Layout {

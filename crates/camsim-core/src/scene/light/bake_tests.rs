@@ -88,13 +88,13 @@ fn texels_have_the_light_of_their_ground_point() {
             for x in 0..side {
                 // Back to columns and rows of heights.
                 let from_middle = (DVec2::new(f64::from(x), f64::from(y)) + 0.5) / f64::from(side) - 0.5;
-                let place = DVec2::from_angle(-turn).rotate(from_middle * 60.0) + DVec2::new(20.0, 15.0);
+                let position = DVec2::from_angle(-turn).rotate(from_middle * 60.0) + DVec2::new(20.0, 15.0);
                 let byte = terrain.texture.rgba8[4 * (y * side + x) as usize];
-                if place.x < 0.0 || place.y < 0.0 || place.x > 39.0 || place.y > 29.0 {
+                if position.x < 0.0 || position.y < 0.0 || position.x > 39.0 || position.y > 29.0 {
                     continue;
                 }
-                let (i, j) = ((place.x as usize).min(38), (place.y as usize).min(28));
-                let (s, t) = (place.x - i as f64, place.y - j as f64);
+                let (i, j) = ((position.x as usize).min(38), (position.y as usize).min(28));
+                let (s, t) = (position.x - i as f64, position.y - j as f64);
                 let [nw, ne, sw, se] = [light(i, j), light(i + 1, j), light(i, j + 1), light(i + 1, j + 1)];
                 // The diagonal runs from north-west to south-east.
                 let wanted = if s > t {

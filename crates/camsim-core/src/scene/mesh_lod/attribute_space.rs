@@ -30,9 +30,9 @@ impl AttributeSpace {
         let mut areas = [0.0; 2];
         for corners in shape.indices.chunks_exact(3) {
             let [a, b, c] = [0, 1, 2].map(|k| shape.vertices[corners[k] as usize]);
-            let place = |vertex: MeshVertex| glam::Vec3::from(vertex.position_m).as_dvec3();
+            let position = |vertex: MeshVertex| glam::Vec3::from(vertex.position_m).as_dvec3();
             let uv = |vertex: MeshVertex| glam::Vec2::from(vertex.uv).as_dvec2();
-            areas[0] += (place(b) - place(a)).cross(place(c) - place(a)).length();
+            areas[0] += (position(b) - position(a)).cross(position(c) - position(a)).length();
             areas[1] += (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
         }
         let bounds = shape.bounds();

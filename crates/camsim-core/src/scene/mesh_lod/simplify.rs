@@ -80,11 +80,11 @@ impl<const AXES: usize> Simplifier<AXES> {
     pub fn new(shape: &Shape) -> Self {
         let points = AttributeSpace::new(shape).points(shape);
         let first = shape.canonical_vertices();
-        let mut places = HashMap::new();
+        let mut first_at = HashMap::new();
         let position = |vertex: &MeshVertex| vertex.position_m.map(|part| (part + 0.0).to_bits());
         let position_of: Vec<u32> = (0..)
             .zip(&shape.vertices)
-            .map(|(i, vertex)| *places.entry(position(vertex)).or_insert(i))
+            .map(|(i, vertex)| *first_at.entry(position(vertex)).or_insert(i))
             .collect();
         let triangles: Vec<[u32; 3]> = shape
             .indices

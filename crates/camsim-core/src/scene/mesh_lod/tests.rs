@@ -156,13 +156,13 @@ fn flat_walls_simplify_without_error() {
 
 /// Area of a level's triangles.
 fn area_m2(shape: &Shape, level: &ShapeLod) -> f64 {
-    let place = |corner: u32| glam::Vec3::from(shape.vertices[corner as usize].position_m).as_dvec3();
+    let position = |corner: u32| glam::Vec3::from(shape.vertices[corner as usize].position_m).as_dvec3();
     level
         .indices
         .as_chunks::<3>()
         .0
         .iter()
-        .map(|&[a, b, c]| 0.5 * (place(b) - place(a)).cross(place(c) - place(a)).length())
+        .map(|&[a, b, c]| 0.5 * (position(b) - position(a)).cross(position(c) - position(a)).length())
         .sum()
 }
 

@@ -31,7 +31,7 @@ pub enum Between<V> {
 }
 
 /// The keys around an instant.
-struct Place {
+struct Interval {
     key: usize,
     next: usize,
     /// Fraction of the way from one to the other, 0 to 1.
@@ -70,16 +70,16 @@ impl<V> Curve<V> {
         [self.times_s[0], self.times_s[self.times_s.len() - 1]]
     }
 
-    fn place(&self, t_s: f64) -> Place {
+    fn interval(&self, t_s: f64) -> Interval {
         let last = self.times_s.len() - 1;
         let key = self.times_s.partition_point(|&key_s| key_s <= t_s);
         if key == 0 {
-            return Place { key: 0, next: 0, fraction: 0.0, span_s: 0.0 };
+            return Interval { key: 0, next: 0, fraction: 0.0, span_s: 0.0 };
         }
         let (key, next) = (key - 1, key.min(last));
         let span_s = self.times_s[next] - self.times_s[key];
         let fraction = if span_s > 0.0 { (t_s - self.times_s[key]) / span_s } else { 0.0 };
-        Place { key, next, fraction, span_s }
+        Interval { key, next, fraction, span_s }
     }
 }
 
@@ -133,7 +133,7 @@ impl Curve<DVec3> {
     /// Value and derivative a second at a time; constant beyond the ends.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (DVec3, DVec3) {
-        let Place { key, next, fraction, span_s } = self.place(t_s);
+        let Interval { key, next, fraction, span_s } = self.interval(t_s);
         let (a, b) = (self.values[key], self.values[next]);
         if span_s == 0.0 {
             return (a, DVec3::ZERO);
@@ -177,7 +177,7 @@ impl Curve<DVec3> {
 
     /// Value and derivative just before a time.
     fn before(&self, t_s: f64) -> (DVec3, DVec3) {
-        let Place { key, fraction, .. } = self.place(t_s);
+        let Interval { key, fraction, .. } = self.interval(t_s);
         if fraction > 0.0 || self.times_s[key] != t_s || key == 0 {
             return self.at(t_s);
         }
@@ -199,7 +199,7 @@ impl Curve<DQuat> {
     /// Rotation and angular rate in the outer axes, rad/s; constant beyond the ends.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (DQuat, DVec3) {
-        let Place { key, next, fraction, span_s } = self.place(t_s);
+        let Interval { key, next, fraction, span_s } = self.interval(t_s);
         let (a, b) = (self.values[key], self.values[next]);
         if span_s == 0.0 {
             return (a.normalize(), DVec3::ZERO);
@@ -230,7 +230,7 @@ impl Curve<DQuat> {
         if matches!(self.between, Between::Cubic { .. }) && self.times_s.len() > 1 {
             return std::f64::consts::PI;
         }
-        let first = self.place(from_s).key;
+        let first = self.interval(from_s).key;
         let pairs = first..self.times_s.len().saturating_sub(1);
         let in_reach = pairs.take_while(|&k| self.times_s[k] <= to_s);
         in_reach

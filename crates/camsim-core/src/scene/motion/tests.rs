@@ -48,14 +48,14 @@ fn instants() -> impl Iterator<Item = f64> {
 const POINT: DVec3 = DVec3::new(4.0, -2.5, 1.5);
 
 #[test]
-fn everything_is_at_its_place_at_time_zero() {
+fn everything_is_at_its_position_at_time_zero() {
     for motion in motions() {
         assert!(motion.state(0.0).point(POINT).distance(POINT) < 1e-12);
     }
 }
 
 #[test]
-fn rates_are_the_derivatives_of_places() {
+fn rates_are_the_derivatives_of_positions() {
     let h = 1e-5;
     for (i, motion) in motions().iter().enumerate() {
         for t_s in instants() {

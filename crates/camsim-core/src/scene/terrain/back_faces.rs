@@ -42,8 +42,8 @@ impl BorderPart {
     ///
     /// A side from a to b turns by `(a - p) x (b - a)`. The bounds must exclude 0 by at least [`Self::SURE`]
     /// of the products' size, which is far more than rounding.
-    fn turn(&self, place: DVec2) -> Option<f64> {
-        let [from, step] = [self.from_m.map(|m| m - place), self.step_m];
+    fn turn(&self, position: DVec2) -> Option<f64> {
+        let [from, step] = [self.from_m.map(|m| m - position), self.step_m];
         let products = |along: fn(DVec2) -> f64, across: fn(DVec2) -> f64| {
             let all = [
                 along(from[0]) * across(step[0]),
@@ -80,19 +80,19 @@ impl Terrain {
     /// Whether all sides turn the same way around the position, which lies inside. Most are decided by the
     /// bounds of their part; only parts seen end-on are tested side by side.
     pub(super) fn border_faces_away_from(&self, position_ned_m: DVec3) -> bool {
-        let place = position_ned_m.truncate();
+        let position = position_ned_m.truncate();
         [1.0, -1.0].into_iter().any(|sign| {
-            self.border.iter().all(|part| match part.turn(place) {
+            self.border.iter().all(|part| match part.turn(position) {
                 Some(turn) => turn == sign,
-                None => part.sides.clone().all(|side| sign * self.side_turn(side, place) > 0.0),
+                None => part.sides.clone().all(|side| sign * self.side_turn(side, position) > 0.0),
             })
         })
     }
 
     /// Signed area whose sign is the direction in which a side of the border turns around a position.
-    pub(super) fn side_turn(&self, side: u32, place: DVec2) -> f64 {
+    pub(super) fn side_turn(&self, side: u32, position: DVec2) -> f64 {
         let [from, to] = [side, (side + 1) % self.border_sides()]
-            .map(|vertex| self.border_vertex(vertex).truncate() - place);
+            .map(|vertex| self.border_vertex(vertex).truncate() - position);
         from.perp_dot(to)
     }
 

@@ -131,23 +131,23 @@ impl Terrain {
         }
         let cells = [cols - 1, rows - 1];
         let chunk_grid = cells.map(|n| n.div_ceil(CHUNK_CELLS));
-        let places = places(cells, chunk_grid)?;
-        let mut vertices = vec![TerrainVertex::default(); places.iter().map(ChunkSpan::count).sum()];
-        let mut errors = vec![0; places.len() * errors::PER_CHUNK];
+        let spans = spans(cells, chunk_grid)?;
+        let mut vertices = vec![TerrainVertex::default(); spans.iter().map(ChunkSpan::count).sum()];
+        let mut errors = vec![0; spans.len() * errors::PER_CHUNK];
         // Positions are expensive to compute. A few chunks nearly always determine the quantum; if another
         // chunk needs a larger one, the pass is repeated.
         let some =
-            places.iter().step_by(places.len().div_ceil(SOME_CHUNKS)).map(|place| points_of(grid, *place).1);
+            spans.iter().step_by(spans.len().div_ceil(SOME_CHUNKS)).map(|span| points_of(grid, *span).1);
         let mut quantum_m = quantum(some);
         let parts = loop {
-            let parts: Vec<ChunkPart> = places
+            let parts: Vec<ChunkPart> = spans
                 .par_iter()
                 .zip(
-                    split(&mut vertices, &places)
+                    split(&mut vertices, &spans)
                         .into_par_iter()
                         .zip(errors.par_chunks_exact_mut(errors::PER_CHUNK)),
                 )
-                .map(|(place, (vertices, errors))| part(grid, *place, quantum_m, vertices, errors))
+                .map(|(span, (vertices, errors))| part(grid, *span, quantum_m, vertices, errors))
                 .collect();
             let exact_m = quantum(parts.iter().map(|part| part.bounds));
             if exact_m == quantum_m {
@@ -220,19 +220,19 @@ impl Terrain {
         texture: Option<Arc<Texture>>,
     ) -> Result<Self, TerrainError> {
         let middle = [0.5 * (f64::from(cols) - 1.0), 0.5 * (f64::from(rows) - 1.0)];
-        let place =
+        let span =
             |index: usize| [f64::from(index as u32 % cols.max(1)), f64::from(index as u32 / cols.max(1))];
         let points: Vec<_> = heights
             .iter()
             .enumerate()
             .map(|(index, height)| {
-                let [i, j] = place(index);
+                let [i, j] = span(index);
                 DVec3::new((middle[1] - j) * cell_m, (i - middle[0]) * cell_m, -height)
             })
             .collect();
         let uvs: Vec<_> = (0..heights.len())
             .map(|index| {
-                let [i, j] = place(index);
+                let [i, j] = span(index);
                 [((i + 0.5) / f64::from(cols)) as f32, ((j + 0.5) / f64::from(rows)) as f32]
             })
             .collect();
@@ -264,38 +264,38 @@ impl Terrain {
     }
 }
 
-fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<ChunkSpan>, TerrainError> {
+fn spans(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<ChunkSpan>, TerrainError> {
     let [cols, rows] = cells.map(|n| n + 1);
     if u64::from(chunk_grid[0]) * u64::from(chunk_grid[1]) > 1 << (u32::BITS - VERTEX_BITS) {
         return Err(TerrainError::TooLarge { cols, rows });
     }
-    let mut places = Vec::new();
+    let mut spans = Vec::new();
     let mut first_vertex = 0u32;
     for y in 0..chunk_grid[1] {
         for x in 0..chunk_grid[0] {
             let first_cell = [x * CHUNK_CELLS, y * CHUNK_CELLS];
             let size = [0, 1].map(|k: usize| (cells[k] - first_cell[k]).min(CHUNK_CELLS));
-            places.push(ChunkSpan { first_cell, cells: size, first_vertex });
+            spans.push(ChunkSpan { first_cell, cells: size, first_vertex });
             let count = (size[0] + 1) * (size[1] + 1);
             first_vertex = first_vertex.checked_add(count).ok_or(TerrainError::TooLarge { cols, rows })?;
         }
     }
-    Ok(places)
+    Ok(spans)
 }
 
 /// The vertices of each chunk, as mutable slices.
-fn split<'a>(mut vertices: &'a mut [TerrainVertex], places: &[ChunkSpan]) -> Vec<&'a mut [TerrainVertex]> {
-    let first = |place: &ChunkSpan| {
-        let (own, rest) = std::mem::take(&mut vertices).split_at_mut(place.count());
+fn split<'a>(mut vertices: &'a mut [TerrainVertex], spans: &[ChunkSpan]) -> Vec<&'a mut [TerrainVertex]> {
+    let first = |span: &ChunkSpan| {
+        let (own, rest) = std::mem::take(&mut vertices).split_at_mut(span.count());
         vertices = rest;
         own
     };
-    places.iter().map(first).collect()
+    spans.iter().map(first).collect()
 }
 
 /// Positions of a chunk's vertices, and their bounding box.
-fn points_of(grid: &dyn TerrainGrid, place: ChunkSpan) -> (Vec<DVec3>, Aabb) {
-    let points: Vec<DVec3> = place.vertices().map(|at| grid.point_ned_m(at)).collect();
+fn points_of(grid: &dyn TerrainGrid, span: ChunkSpan) -> (Vec<DVec3>, Aabb) {
+    let points: Vec<DVec3> = span.vertices().map(|at| grid.point_ned_m(at)).collect();
     let mut bounds = Aabb::EMPTY;
     points.iter().filter(|point| point.is_finite()).for_each(|&point| bounds.include(point));
     (points, bounds)
@@ -319,15 +319,15 @@ fn quantum(boxes: impl Iterator<Item = Aabb>) -> f64 {
 
 fn part(
     grid: &dyn TerrainGrid,
-    place: ChunkSpan,
+    span: ChunkSpan,
     quantum_m: f64,
     vertices: &mut [TerrainVertex],
     errors: &mut [u16],
 ) -> ChunkPart {
-    let (points, bounds) = points_of(grid, place);
+    let (points, bounds) = points_of(grid, span);
     let centre_ned_m = chunk_centre(&bounds);
     let mut exact_bounds = Aabb::EMPTY;
-    for ((vertex, point), at) in vertices.iter_mut().zip(points).zip(place.vertices()) {
+    for ((vertex, point), at) in vertices.iter_mut().zip(points).zip(span.vertices()) {
         let offset_m = if point.is_finite() {
             // The position is rounded, not the offset, so that chunks agree on shared vertices. Both steps
             // are exact in f64.
@@ -340,16 +340,16 @@ fn part(
         *vertex = TerrainVertex { offset_m, uv: grid.uv(at) };
     }
 
-    let (triangles, void_cells) = count_without_voids(place.cells, vertices);
+    let (triangles, void_cells) = count_without_voids(span.cells, vertices);
     let chunk = TerrainChunk {
         centre_ned_m,
         bounds: exact_bounds,
-        first_vertex: place.first_vertex,
-        cells: place.cells,
+        first_vertex: span.first_vertex,
+        cells: span.cells,
         has_surface: triangles > 0,
         has_voids: vertices.iter().any(|vertex| vertex.offset_m[0].is_nan()),
     };
-    let table = chunk_errors(&ChunkGrid { cells: place.cells, vertices });
+    let table = chunk_errors(&ChunkGrid { cells: span.cells, vertices });
     errors.copy_from_slice(&table.keys);
     ChunkPart { chunk, bounds, horizontal_m: table.horizontal_m, void_cells }
 }

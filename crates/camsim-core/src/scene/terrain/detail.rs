@@ -206,8 +206,8 @@ impl<'a> TerrainDetail<'a> {
 
     /// Cached tolerances of a chunk; `None` out of sight.
     pub(super) fn tolerances(&self, chunk: u32) -> Option<&Tolerances> {
-        let place = self.in_sight.binary_search(&chunk).ok()?;
-        Some(self.tolerances[place].get_or_init(|| Box::new(Tolerances::new(chunk))))
+        let index = self.in_sight.binary_search(&chunk).ok()?;
+        Some(self.tolerances[index].get_or_init(|| Box::new(Tolerances::new(chunk))))
     }
 
     /// Strictest tolerance over one of the lattice's sets of squares.
@@ -234,7 +234,7 @@ impl<'a> TerrainDetail<'a> {
 
     /// Whether the square of 8x8 cells that holds a vertex and the cell to its south-east is in sight.
     pub(super) fn block_in_sight(&self, known: &Tolerances, vertex: u32) -> bool {
-        let [column, row] = lattice::place(vertex).map(|n| (n / NODE_CELLS[0]) as i32);
+        let [column, row] = lattice::position(vertex).map(|n| (n / NODE_CELLS[0]) as i32);
         self.square_tolerance(known, 0, column, row) != OUT_OF_SIGHT
     }
 

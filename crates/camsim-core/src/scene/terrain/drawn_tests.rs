@@ -55,7 +55,7 @@ fn full_m(terrain: &Terrain, at: [f64; 2]) -> DVec3 {
     let [i, j] = [0, 1].map(|k: usize| (at[k].max(0.0) as u32).min(terrain.cells[k] - 1));
     let (x, y) = (at[0] - f64::from(i), at[1] - f64::from(j));
     let [nw, ne, sw, se] =
-        [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]].map(|place| vertex_m(terrain, place));
+        [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]].map(|node| vertex_m(terrain, node));
     if x > y { nw + x * (ne - nw) + y * (se - ne) } else { nw + y * (sw - nw) + x * (se - sw) }
 }
 
@@ -86,8 +86,8 @@ fn covered(terrain: &Terrain, triangles: &[[[u32; 2]; 3]]) -> HashMap<[i64; 2], 
         };
         for j in range(1) {
             for i in range(0) {
-                for place in [[31, 62], [62, 31]] {
-                    let p = [100 * i + place[0], 100 * j + place[1]];
+                for node in [[31, 62], [62, 31]] {
+                    let p = [100 * i + node[0], 100 * j + node[1]];
                     let least = area2([a, b, p]).min(area2([b, c, p])).min(area2([c, a, p]));
                     if least >= 0 {
                         *covers.entry(p).or_default() += u32::from(least > 0);
@@ -113,7 +113,7 @@ fn check_cover(terrain: &Terrain, camera: &CameraPose, mesh: &TerrainMesh) {
         if known.contains(&[b, a]) || along_border(0) || along_border(1) {
             continue;
         }
-        let [from, to] = [a, b].map(|place| vertex_m(terrain, place));
+        let [from, to] = [a, b].map(|node| vertex_m(terrain, node));
         let in_sight = (0..=16).any(|k| seen(camera, from.lerp(to, f64::from(k) / 16.0)).is_some());
         assert!(!in_sight, "a gap at {a:?} {b:?}");
     }
@@ -121,8 +121,8 @@ fn check_cover(terrain: &Terrain, camera: &CameraPose, mesh: &TerrainMesh) {
     assert!(covered.values().all(|&times| times <= 1));
     for j in 0..terrain.cells[1] {
         for i in 0..terrain.cells[0] {
-            for place in [[31, 62], [62, 31]] {
-                let p = [100 * i64::from(i) + place[0], 100 * i64::from(j) + place[1]];
+            for node in [[31, 62], [62, 31]] {
+                let p = [100 * i64::from(i) + node[0], 100 * i64::from(j) + node[1]];
                 let is_seen = seen(camera, full_m(terrain, p.map(|n| n as f64 / 100.0))).is_some();
                 assert!(!is_seen || covered.contains_key(&p), "{p:?} is in sight and not drawn");
             }
@@ -177,7 +177,7 @@ fn culled_back_faces_are_never_visible() {
             let corners = |mesh: &TerrainMesh| -> Vec<[DVec3; 3]> {
                 triangles(&terrain, mesh)
                     .into_iter()
-                    .map(|t| t.map(|place| vertex_m(&terrain, place)))
+                    .map(|t| t.map(|node| vertex_m(&terrain, node)))
                     .collect()
             };
             let (all, drawn) = (corners(&all), corners(&drawn));
@@ -273,7 +273,7 @@ fn displacement_is_within_the_tolerance() {
             assert!(mesh.lod.max_error_px <= max_error_px, "{} > {max_error_px}", mesh.lod.max_error_px);
             let (mut worst, mut worst_from_aside) = (0.0_f64, 0.0_f64);
             for triangle in triangles(&terrain, &mesh) {
-                let corners = triangle.map(|place| vertex_m(&terrain, place));
+                let corners = triangle.map(|node| vertex_m(&terrain, node));
                 for _ in 0..4 {
                     let (a, b) = (random.next(), random.next());
                     let [a, b] = if a + b > 1.0 { [1.0 - a, 1.0 - b] } else { [a, b] };
@@ -379,11 +379,12 @@ fn errors_are_exact() {
         let mut level: Vec<[u32; 3]> = lattice::ROOTS.to_vec();
         for _ in 0..7 {
             for &triangle in &level {
-                let corners = triangle.map(lattice::place).map(|[i, j]| [i.min(cells[0]), j.min(cells[1])]);
+                let corners =
+                    triangle.map(lattice::position).map(|[i, j]| [i.min(cells[0]), j.min(cells[1])]);
                 if area2(corners.map(|p| p.map(i64::from))) == 0 {
                     continue;
                 }
-                let points = corners.map(|place| vertex_m(&terrain, place));
+                let points = corners.map(|node| vertex_m(&terrain, node));
                 let limit = keys[lattice::halves(triangle).0 as usize];
                 let mut worst = 0.0_f64;
                 for _ in 0..100 {
@@ -443,7 +444,7 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
             );
             let drawn: Vec<[DVec3; 3]> = triangles(&terrain, &detail.mesh())
                 .into_iter()
-                .map(|t| t.map(|place| vertex_m(&terrain, place)))
+                .map(|t| t.map(|node| vertex_m(&terrain, node)))
                 .collect();
             let (mut met, mut moved, mut known) = (0, 0.0_f64, [0; 2]);
             for _ in 0..200 {
@@ -510,7 +511,7 @@ fn voids_remove_only_their_triangles() {
     let loose = detail(&terrain, &nadir(DVec3::new(0.0, 0.0, -8000.0)), 100.0);
     assert_eq!(lost(&loose), 7);
     assert!(loose.lod.triangles < 200, "{}", loose.lod.triangles);
-    let is_finite = |t: &[[u32; 2]; 3]| t.iter().all(|&place| vertex_m(&terrain, place).is_finite());
+    let is_finite = |t: &[[u32; 2]; 3]| t.iter().all(|&node| vertex_m(&terrain, node).is_finite());
     assert!(
         triangles(&terrain, &loose).iter().all(is_finite) && triangles(&terrain, &full).iter().all(is_finite)
     );
@@ -550,13 +551,13 @@ fn chunk_search_matches_a_test_of_all_chunks() {
         assert_eq!(mesh.chunks, in_view);
         (found, hidden) = (found + in_view.len(), hidden + terrain.chunks.len() - in_view.len());
         // Chunks are drawn one after the other, the nearest first.
-        let mut places: Vec<u32> = mesh.indices.iter().map(|index| index >> VERTEX_BITS).collect();
-        places.dedup();
+        let mut order: Vec<u32> = mesh.indices.iter().map(|index| index >> VERTEX_BITS).collect();
+        order.dedup();
         let distance_m =
-            |&place: &u32| terrain.chunks[mesh.chunks[place as usize] as usize].bounds.distance_m(position);
-        assert!(places.is_sorted_by(|a, b| distance_m(a) <= distance_m(b)));
-        places.sort_unstable();
-        assert!(places.windows(2).all(|pair| pair[0] < pair[1]));
+            |&index: &u32| terrain.chunks[mesh.chunks[index as usize] as usize].bounds.distance_m(position);
+        assert!(order.is_sorted_by(|a, b| distance_m(a) <= distance_m(b)));
+        order.sort_unstable();
+        assert!(order.windows(2).all(|pair| pair[0] < pair[1]));
     }
     assert!(found > 300 && hidden > 300, "{found} {hidden}");
 }

@@ -83,7 +83,7 @@ pub(super) fn chunk_errors(grid: &ChunkGrid<'_>) -> ErrorTable {
 
 fn add_triangle(grid: &ChunkGrid<'_>, triangle: [u32; 3], depth: u32, errors: &mut ErrorTable) {
     let corners = triangle.map(|vertex| {
-        let [i, j] = lattice::place(vertex);
+        let [i, j] = lattice::position(vertex);
         [i.min(grid.cells[0]) as i32, j.min(grid.cells[1]) as i32]
     });
     let (middle, halves) = lattice::halves(triangle);
@@ -230,7 +230,7 @@ pub(super) fn saturate(keys: &mut [u16], chunk_grid: [u32; 2]) {
     for depth in (0..DEPTHS).rev() {
         keys.par_chunks_exact_mut(PER_CHUNK).for_each(|chunk| {
             for &vertex in &LATTICE.by_depth[depth as usize] {
-                let [i, j] = lattice::place(vertex).map(|n| n as i32);
+                let [i, j] = lattice::position(vertex).map(|n| n as i32);
                 chunk[vertex as usize] =
                     needing(depth).iter().fold(chunk[vertex as usize], |worst, [di, dj]| {
                         let [i, j] = [i + di, j + dj];

@@ -55,13 +55,13 @@ pub(super) fn turned([_, _, c]: [u32; 3], cell: u32) -> [u32; 3] {
 }
 
 /// Column and row of a vertex.
-pub(super) fn place(vertex: u32) -> [u32; 2] {
+pub(super) fn position(vertex: u32) -> [u32; 2] {
     [vertex % SIDE, vertex / SIDE]
 }
 
 /// Depth of a vertex; `None` for the corners of the chunk.
 pub(super) fn depth_of(vertex: u32) -> Option<u32> {
-    let [i, j] = place(vertex);
+    let [i, j] = position(vertex);
     let power = (i | j).trailing_zeros();
     let step = CHUNK_CELLS.trailing_zeros().checked_sub(power + 1)?;
     // At the centre of a square, or of a side of one.
@@ -102,18 +102,18 @@ impl Squares {
         self.rows[0]..=self.rows[1]
     }
 
-    fn around(place: [u32; 2], depth: u32) -> Self {
+    fn around(position: [u32; 2], depth: u32) -> Self {
         let size = node_size(depth);
         let (reach, cells) = (reach(depth) as i32, NODE_CELLS[size] as i32);
         let along = |at: u32| {
             [(at as i32 - reach).div_euclid(cells), (at as i32 + reach + cells - 1).div_euclid(cells) - 1]
         };
-        Self { size, columns: along(place[0]), rows: along(place[1]) }
+        Self { size, columns: along(position[0]), rows: along(position[1]) }
     }
 
-    fn of_cell(place: [u32; 2]) -> Self {
+    fn of_cell(position: [u32; 2]) -> Self {
         let along = |at: u32| [(at / NODE_CELLS[0]) as i32; 2];
-        Self { size: 0, columns: along(place[0]), rows: along(place[1]) }
+        Self { size: 0, columns: along(position[0]), rows: along(position[1]) }
     }
 }
 
@@ -141,11 +141,11 @@ impl Lattice {
                 (sets.len() - 1) as u16
             })
         };
-        let of_vertex = |vertex| depth_of(vertex).map(|depth| Squares::around(place(vertex), depth));
+        let of_vertex = |vertex| depth_of(vertex).map(|depth| Squares::around(position(vertex), depth));
         let set_of_vertex =
             (0..VERTICES as u32).map(|vertex| of_vertex(vertex).map_or(0, &mut number)).collect();
         let cell = |half: u32| {
-            let [i, j] = place(2 * half + 1);
+            let [i, j] = position(2 * half + 1);
             // The last column and row have no cells.
             Squares::of_cell([i.min(CHUNK_CELLS - 1), j.min(CHUNK_CELLS - 1)])
         };
@@ -165,7 +165,7 @@ mod tests {
 
     /// Twice the signed area in cells.
     fn area2(t: [u32; 3]) -> i64 {
-        let [a, b, c] = t.map(|p| place(p).map(i64::from));
+        let [a, b, c] = t.map(|p| position(p).map(i64::from));
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     }
 
@@ -186,7 +186,7 @@ mod tests {
                 assert_eq!(area2(triangle), (-64 * 64) >> depth, "{triangle:?}");
                 if depth < DEPTHS {
                     assert_eq!(depth_of(halves(triangle).0), Some(depth));
-                    let [at, ends @ ..] = [halves(triangle).0, triangle[0], triangle[1]].map(place);
+                    let [at, ends @ ..] = [halves(triangle).0, triangle[0], triangle[1]].map(position);
                     assert!((0..2).all(|k| 2 * at[k] == ends[0][k] + ends[1][k]));
                 } else if let Some(cell) = cell_to_turn(triangle) {
                     assert_eq!((area2(turned(triangle, cell)), cell % 2), (-1, 1));
@@ -241,7 +241,7 @@ mod tests {
                     assert!(rows.start <= inner_rows.start && rows.end >= inner_rows.end, "{triangle:?}");
                     compared += 1;
                 }
-                for corner in triangle.map(place) {
+                for corner in triangle.map(position) {
                     assert!(columns.contains(&(corner[0] as i32)) || columns.end == corner[0] as i32);
                     assert!(rows.contains(&(corner[1] as i32)) || rows.end == corner[1] as i32);
                 }

@@ -84,12 +84,12 @@ mod tests {
                 && placed.indices.len() == mesh.indices.len()
                 && placed.lod == mesh.lod
         );
-        for (place, index) in placed.indices.iter().zip(&mesh.indices) {
+        for (position, index) in placed.indices.iter().zip(&mesh.indices) {
             let chunk = &terrain.chunks[mesh.chunks[(index >> VERTEX_BITS) as usize] as usize];
             let vertex = terrain.vertices[(chunk.first_vertex + (index & ((1 << VERTEX_BITS) - 1))) as usize];
             let exact_m = chunk.centre_ned_m - base_ned_m + Vec3::from(vertex.offset_m).as_dvec3();
             // Rounded once.
-            let [north, east, down, uv @ ..] = placed.vertices[*place as usize];
+            let [north, east, down, uv @ ..] = placed.vertices[*position as usize];
             assert_eq!(([north, east, down], uv), (exact_m.as_vec3().to_array(), vertex.uv));
         }
         // Only vertices on chunk borders occur twice, and every vertex is used.
@@ -98,14 +98,14 @@ mod tests {
         used.dedup();
         assert_eq!(used.len(), placed.vertices.len());
         let inner = placed.vertices.len() - mesh.chunks.len() * 4 * 64;
-        let mut places: Vec<[u32; 3]> = placed
+        let mut positions: Vec<[u32; 3]> = placed
             .vertices
             .iter()
             .map(|vertex| [vertex[0], vertex[1], vertex[2]].map(f32::to_bits))
             .collect();
-        places.sort_unstable();
-        places.dedup();
-        assert!(places.len() >= inner);
+        positions.sort_unstable();
+        positions.dedup();
+        assert!(positions.len() >= inner);
         assert_eq!(placed.bytes(), 20 * placed.vertices.len() as u64 + 4 * placed.indices.len() as u64);
     }
 }

@@ -146,9 +146,9 @@ impl Terrain {
         let mut beside = [[DVec2::NAN; SIDE]; SIDE];
         for (j, row) in (j0..).zip(beside.iter_mut().take(rows + 1)) {
             let first = (chunk.first_vertex + j * (chunk.cells[0] + 1) + i0) as usize;
-            for (place, vertex) in row.iter_mut().zip(&self.vertices[first..=first + columns]) {
+            for (sheared, vertex) in row.iter_mut().zip(&self.vertices[first..=first + columns]) {
                 let offset_m = centre_m + Vec3::from(vertex.offset_m).as_dvec3();
-                *place = DVec2::new(offset_m.dot(right), offset_m.dot(up));
+                *sheared = DVec2::new(offset_m.dot(right), offset_m.dot(up));
             }
         }
         let mut best: Option<TerrainHit> = None;

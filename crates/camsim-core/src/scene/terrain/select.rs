@@ -57,9 +57,9 @@ impl TerrainDetail<'_> {
             .enumerate()
             .map_init(
                 || Tolerances::new(0),
-                |known, (place, &chunk)| {
+                |known, (index, &chunk)| {
                     known.reset(chunk);
-                    self.chunk_part(known, place as u32, chunk, from_above)
+                    self.chunk_part(known, index as u32, chunk, from_above)
                 },
             )
             .collect();
@@ -84,10 +84,10 @@ impl TerrainDetail<'_> {
         (fraction * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
     }
 
-    fn chunk_part(&self, known: &Tolerances, place: u32, chunk: u32, from_above: bool) -> ChunkMesh {
+    fn chunk_part(&self, known: &Tolerances, index: u32, chunk: u32, from_above: bool) -> ChunkMesh {
         let mut walk = HierarchyWalk {
             judged: ChunkErrors::new(self, known, chunk),
-            emit: TriangleEmitter::new(self, place, chunk, from_above),
+            emit: TriangleEmitter::new(self, index, chunk, from_above),
             nearest: None,
         };
         ROOTS.into_iter().for_each(|root| walk.triangle(root, 0));
@@ -114,16 +114,16 @@ impl TerrainDetail<'_> {
         let judged = ChunkErrors::new(self, known, hit.chunk);
         let mut waiting = Vec::with_capacity(2 + DEPTHS as usize);
         waiting.extend(ROOTS.map(|root| (root, 0)));
-        let places = |triangle: [u32; 3]| {
+        let positions = |triangle: [u32; 3]| {
             triangle.map(|vertex| {
-                let [i, j] = lattice::place(vertex);
+                let [i, j] = lattice::position(vertex);
                 [i.min(chunk.cells[0]), j.min(chunk.cells[1])]
             })
         };
         // One half of a cell may be part of a larger triangle while the other is at full detail.
         let mut is_full = true;
         while let Some((triangle, depth)) = waiting.pop() {
-            let mut corners = places(triangle);
+            let mut corners = positions(triangle);
             let beside = |axis: usize| {
                 let along = corners.map(|corner| corner[axis]);
                 cell[axis] >= along.into_iter().fold(0, u32::max)
@@ -142,7 +142,7 @@ impl TerrainDetail<'_> {
             } else if let Some(cell) = lattice::cell_to_turn(triangle) {
                 let is_turned = judged.cell(cell).is_needed();
                 is_full &= is_turned;
-                corners = if is_turned { places(lattice::turned(triangle, cell)) } else { corners };
+                corners = if is_turned { positions(lattice::turned(triangle, cell)) } else { corners };
             }
             drawn.triangles.push(corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j)));
         }
@@ -327,7 +327,7 @@ struct IrregularChunk<'a> {
 }
 
 impl<'a> TriangleEmitter<'a> {
-    fn new(detail: &'a TerrainDetail<'_>, place: u32, chunk: u32, from_above: bool) -> Self {
+    fn new(detail: &'a TerrainDetail<'_>, index: u32, chunk: u32, from_above: bool) -> Self {
         let terrain = detail.terrain;
         let span = &terrain.chunks[chunk as usize];
         let is_odd = span.cells != [SIDE - 1; 2] || span.has_voids;
@@ -336,17 +336,17 @@ impl<'a> TriangleEmitter<'a> {
             vertices: &terrain.vertices[span.first_vertex as usize..],
         });
         let facing = from_above.then(|| BackFaceTest::new(detail, chunk));
-        Self { indices: Vec::new(), base: place << VERTEX_BITS, facing, back_facing: 0, odd }
+        Self { indices: Vec::new(), base: index << VERTEX_BITS, facing, back_facing: 0, odd }
     }
 
     fn triangle(&mut self, triangle: [u32; 3]) {
         let Some(odd) = &self.odd else { return self.vertices(triangle) };
-        let places = triangle.map(|vertex| {
-            let [i, j] = lattice::place(vertex);
+        let positions = triangle.map(|vertex| {
+            let [i, j] = lattice::position(vertex);
             [i.min(odd.cells[0]), j.min(odd.cells[1])]
         });
-        let vertices = places.map(|[i, j]| j * (odd.cells[0] + 1) + i);
-        let [a, b, c] = places.map(|place| place.map(i64::from));
+        let vertices = positions.map(|[i, j]| j * (odd.cells[0] + 1) + i);
+        let [a, b, c] = positions.map(|position| position.map(i64::from));
         let has_area = (b[0] - a[0]) * (c[1] - a[1]) != (b[1] - a[1]) * (c[0] - a[0]);
         if has_area && vertices.iter().all(|&vertex| !odd.vertices[vertex as usize].offset_m[0].is_nan()) {
             self.vertices(vertices);

@@ -297,11 +297,11 @@ fn border_parts_match_a_test_of_all_sides() {
         let texture = Arc::new(crate::scene::Texture::uniform([255; 4], crate::scene::Encoding::Srgb));
         let terrain = Terrain::new(cols, rows, &points, &uvs, texture).unwrap();
         for _ in 0..400 {
-            let place = glam::DVec2::new(random.within(-700.0, 700.0), random.within(-1150.0, 1150.0));
+            let position = glam::DVec2::new(random.within(-700.0, 700.0), random.within(-1150.0, 1150.0));
             let turns: Vec<f64> =
-                (0..terrain.border_sides()).map(|side| terrain.side_turn(side, place)).collect();
+                (0..terrain.border_sides()).map(|side| terrain.side_turn(side, position)).collect();
             let all = turns.iter().all(|&turn| turn > 0.0) || turns.iter().all(|&turn| turn < 0.0);
-            assert_eq!(terrain.border_faces_away_from(place.extend(-500.0)), all, "{place} {bend_m}");
+            assert_eq!(terrain.border_faces_away_from(position.extend(-500.0)), all, "{position} {bend_m}");
             counts[usize::from(all)] += 1;
         }
     }

@@ -45,7 +45,7 @@ impl BlockTree {
         let middle = if whole.is_empty() { DVec3::ZERO } else { whole.centre() };
         let extent_m = if whole.is_empty() { 0.0 } else { (whole.max - middle).max_element() };
         let mut levels = vec![TreeLevel::new(size)];
-        for (at, each) in places(size).zip(boxes).filter(|(_, each)| !each.is_empty()) {
+        for (at, each) in cells(size).zip(boxes).filter(|(_, each)| !each.is_empty()) {
             levels[0].set(at, &Aabb { min: each.min - middle, max: each.max - middle });
         }
         let mut size = size;
@@ -53,7 +53,7 @@ impl BlockTree {
             let below = &levels[levels.len() - 1];
             size = size.map(|n| n.div_ceil(2));
             let mut level = TreeLevel::new(size);
-            for at in places(size) {
+            for at in cells(size) {
                 let quad = below.quad(at);
                 level.set(at, &(0..4).fold(Aabb::EMPTY, |all, lane| all.union(&quad.get(lane))));
             }
@@ -137,12 +137,12 @@ impl BlockTree {
             let first = count;
             for lane in (0..4).filter(|lane| is_met & (1 << lane) != 0) {
                 // The nearest box is pushed last, so it is popped first.
-                let mut place = count;
-                while place > first && waiting[place - 1].0 < enter[lane as usize] {
-                    waiting[place] = waiting[place - 1];
-                    place -= 1;
+                let mut slot = count;
+                while slot > first && waiting[slot - 1].0 < enter[lane as usize] {
+                    waiting[slot] = waiting[slot - 1];
+                    slot -= 1;
                 }
-                waiting[place] = (
+                waiting[slot] = (
                     enter[lane as usize],
                     BlockNode { level: below, at: [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2] },
                 );
@@ -195,7 +195,7 @@ impl TreeLevel {
 }
 
 /// Columns and rows, row by row.
-fn places(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+fn cells(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     (0..size[1]).flat_map(move |y| (0..size[0]).map(move |x| [x, y]))
 }
 
@@ -212,7 +212,7 @@ mod tests {
             let top = low + DVec3::new(40.0, 40.0, 30.0 * wave(n + 5));
             if n % 11 == 3 { Aabb::EMPTY } else { Aabb { min: low, max: top } }
         };
-        places(size).map(bounds).collect()
+        cells(size).map(bounds).collect()
     }
 
     #[test]
@@ -238,7 +238,7 @@ mod tests {
                     blocks.push(block);
                     limit
                 });
-                for (block, each) in places(size).zip(&boxes) {
+                for (block, each) in cells(size).zip(&boxes) {
                     let t =
                         each.enter(origin, crate::scene::terrain::bounds::inverse(direction), f64::INFINITY);
                     met += u32::from(t.is_some());
@@ -255,7 +255,7 @@ mod tests {
         for away in [0.0, 6.4e6] {
             let boxes = boxes(size, DVec3::splat(away));
             let tree = BlockTree::new(size, &boxes);
-            for (at, each) in places(size).zip(&boxes) {
+            for (at, each) in cells(size).zip(&boxes) {
                 let stored = tree.bounds(BlockNode { level: 0, at });
                 assert_eq!(stored.is_empty(), each.is_empty());
                 if !each.is_empty() {

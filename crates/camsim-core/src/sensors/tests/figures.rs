@@ -59,7 +59,7 @@ fn gravity_above_the_ellipsoid_is_the_gradient_of_the_normal_potential() {
 
 #[test]
 fn gravity_points_along_the_local_vertical() {
-    let frame = place();
+    let frame = local_frame();
     let mut earth = Earth::new(Some(frame), HeightReference::Ellipsoid);
     let here = earth.gravity_ned_m_s2(DVec3::ZERO);
     assert!((here.normalize() - DVec3::Z).length() < 1e-15);

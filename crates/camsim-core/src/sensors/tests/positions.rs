@@ -16,8 +16,8 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[test]
-fn fixes_are_places_of_the_antenna() {
-    let frame = place();
+fn fixes_are_positions_of_the_antenna() {
+    let frame = local_frame();
     let attitude = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let spec = GnssSpec { offset_m: [2.0, 0.0, -1.0], delay_ms: 120.0, ..GnssSpec::default() };
     for heights in [HeightReference::Ellipsoid, HeightReference::Msl] {
@@ -53,13 +53,13 @@ fn errors_of_fixes_have_their_deviations() {
         velocity_sigma_m_s: [0.1, 0.2],
         ..GnssSpec::default()
     };
-    let gnss = gnss(spec, &input(still(DQuat::IDENTITY), Some(place()), [0.0, 10_000.0]));
+    let gnss = gnss(spec, &input(still(DQuat::IDENTITY), Some(local_frame()), [0.0, 10_000.0]));
     let errors: Vec<[DVec3; 2]> = gnss
         .samples()
         .map(|sample| {
             let (fix, truth) = (sample.fix.unwrap(), sample.truth);
             // The geodetic and the local position are the same.
-            let again = place().ned_from_geodetic(fix.at);
+            let again = local_frame().ned_from_geodetic(fix.at);
             assert!((again - fix.position_ned_m).length() < 1e-8);
             [fix.position_ned_m - truth.position_ned_m, fix.velocity_ned_m_s - truth.velocity_ned_m_s]
         })
@@ -77,7 +77,7 @@ fn errors_of_fixes_have_their_deviations() {
 #[test]
 fn fixes_drop_out_as_often_and_as_long_as_asked_for() {
     let spec = GnssSpec { dropout_every_s: 20.0, dropout_mean_s: 5.0, ..GnssSpec::default() };
-    let input = input(still(DQuat::IDENTITY), Some(place()), [0.0, 100_000.0]);
+    let input = input(still(DQuat::IDENTITY), Some(local_frame()), [0.0, 100_000.0]);
     let has_fix: Vec<bool> = gnss(spec, &input).samples().map(|sample| sample.fix.is_some()).collect();
     let without = has_fix.iter().filter(|has| !**has).count();
     let begins = has_fix.windows(2).filter(|pair| pair[0] && !pair[1]).count();
@@ -100,10 +100,10 @@ fn fixes_drop_out_as_often_and_as_long_as_asked_for() {
 #[test]
 fn pressure_is_that_of_the_height() {
     let spec = BarometerSpec { name: "baro0".into(), ..BarometerSpec::default() };
-    let input = input(still(DQuat::IDENTITY), Some(place()), [0.0, 100.0]);
+    let input = input(still(DQuat::IDENTITY), Some(local_frame()), [0.0, 100.0]);
     let first = |spec: &BarometerSpec| Barometer::new(spec, 12, &input).unwrap().samples().next().unwrap();
     let sample = first(&spec);
-    let at = place().geodetic_from_ned(DVec3::new(10.0, -20.0, -30.0));
+    let at = local_frame().geodetic_from_ned(DVec3::new(10.0, -20.0, -30.0));
     assert!((sample.true_msl_m - (at.height_m - geoid_undulation_m(at))).abs() < 3e-3);
     assert!((sample.altitude_m - sample.true_msl_m).abs() < 1e-6);
     assert_eq!(sample.pressure_pa, sample.true_pressure_pa);
@@ -163,8 +163,10 @@ fn iron_and_axes_change_the_field_as_defined() {
     assert!((sample.mag_ut - expected).length() < 1e-13, "{}", sample.mag_ut);
     for date in ["2035-01-01", "2026-02-30"] {
         let spec = MagnetometerSpec { field_ned_ut: None, date: Some(date.into()), ..spec.clone() };
-        let input =
-            SensorInput { earth: Earth::new(Some(place()), HeightReference::Ellipsoid), ..input.clone() };
+        let input = SensorInput {
+            earth: Earth::new(Some(local_frame()), HeightReference::Ellipsoid),
+            ..input.clone()
+        };
         let error = Magnetometer::new(&spec, 12, &input).unwrap_err().to_string();
         assert!(error.contains("magnetometer \"mag0\": the World Magnetic Model"), "{error}");
     }

@@ -35,8 +35,8 @@ fn a_translation_is_felt_as_its_second_derivative() {
         let felt = G - DVec3::X * (amplitude_m * w * w * angle.sin());
         assert!((sample.true_accel_m_s2 - felt).length() < 1e-10, "{}", sample.true_accel_m_s2);
         assert_eq!(sample.true_gyro_rad_s, DVec3::ZERO);
-        let place = DVec3::new(10.3 + amplitude_m * angle.sin(), -20.0, -29.8);
-        assert!((sample.position_ned_m - place).length() < 1e-12);
+        let position = DVec3::new(10.3 + amplitude_m * angle.sin(), -20.0, -29.8);
+        assert!((sample.position_ned_m - position).length() < 1e-12);
     }
     let on_body = ImuSpec { attached_to: SensorCarrier::Body, ..on_camera([0.3, 0.0, 0.2]) };
     assert!(imu(on_body, &input).samples().all(|sample| sample.true_accel_m_s2 == G));
@@ -76,7 +76,7 @@ fn in_flight_the_unit_moves_as_the_camera_does() {
     let path = CameraPath::new(input.trajectory.clone(), &camera_mount).unwrap();
     // Axes of the camera, 0.1 m below its optical centre (the camera's y is down).
     let spec = ImuSpec { axes: SensorAxes::Rdf, rate_hz: 97.0, ..on_camera([1.5, -0.2, 0.5]) };
-    let place = |t_s: f64| {
+    let position = |t_s: f64| {
         let pose = path.pose(t_s);
         pose.position_ned_m + pose.ned_from_camera * DVec3::new(0.0, 0.1, 0.0)
     };
@@ -84,7 +84,7 @@ fn in_flight_the_unit_moves_as_the_camera_does() {
     let step_s = 2e-5;
     for sample in imu(spec, &input).samples() {
         let t_s = sample.time.t_s;
-        let (before, here, after) = (place(t_s - step_s), place(t_s), place(t_s + step_s));
+        let (before, here, after) = (position(t_s - step_s), position(t_s), position(t_s + step_s));
         let pose = path.pose(t_s);
         assert!((sample.position_ned_m - here).length() < 1e-12);
         assert!(sample.ned_from_sensor.angle_between(pose.ned_from_camera) < 1e-7);

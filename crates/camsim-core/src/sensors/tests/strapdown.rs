@@ -141,7 +141,7 @@ fn the_same_on_a_lever_arm_on_the_turning_earth() {
         earth_rate: true,
         ..ImuSpec::default()
     };
-    let samples = minute(spec, Some(place()));
+    let samples = minute(spec, Some(local_frame()));
     let tangent = Tangent::new(46.7_f64.to_radians(), 9.85_f64.to_radians(), 2100.0);
     let earth = tangent.to_local(DVec3::new(0.0, 0.0, 7.292_115e-5));
     let gravity = |p: DVec3| tangent.gravity(p);

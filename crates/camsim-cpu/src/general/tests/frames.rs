@@ -161,7 +161,7 @@ fn solvers_of_constant_twist_follow_a_constant_twist() {
 }
 
 #[test]
-fn places_outside_of_the_ideal_frame_are_not_shown() {
+fn positions_outside_of_the_ideal_frame_are_not_shown() {
     let mut case = Case::new(over_ground(scenario(), DVec3::ZERO, DVec3::ZERO));
     let ideal = &mut case.plan.ideal;
     ideal.size_px[0] /= 2;

@@ -112,8 +112,9 @@ impl Case {
             EdgeStage::Supersampled { scale, thin, .. } => {
                 let fine_pixels: Vec<[(f64, DVec3); 4]> = positions(size_px.map(|side| side * scale))
                     .map(|corner| {
-                        SupersampledImage::SAMPLE_POSITIONS
-                            .map(|place| self.ideal_pixel(number, (corner + place) / f64::from(scale) - 0.5))
+                        SupersampledImage::SAMPLE_POSITIONS.map(|position| {
+                            self.ideal_pixel(number, (corner + position) / f64::from(scale) - 0.5)
+                        })
                     })
                     .collect();
                 let depths = fine_pixels.iter().map(|samples| samples.map(|(w, _)| w as f32)).collect();

@@ -18,25 +18,25 @@ fn spline_equals_its_five_bilinear_reads() {
     let (mut inside_count, mut outside_count) = (0, 0);
     for block in 0..400 {
         // Positions inside and outside of the frame.
-        let place = |i: usize| block * LANES + i;
+        let index = |i: usize| block * LANES + i;
         let position_px = Lanes2 {
             x: per_lane(|i| {
                 if block.is_multiple_of(2) {
-                    1.0 + 66.9 * part(place(i), 0.754_878)
+                    1.0 + 66.9 * part(index(i), 0.754_878)
                 } else {
-                    -4.0 + 78.0 * part(place(i), 0.754_878)
+                    -4.0 + 78.0 * part(index(i), 0.754_878)
                 }
             }),
             y: per_lane(|i| {
                 if block.is_multiple_of(2) {
-                    1.0 + 41.9 * part(place(i), 0.569_84)
+                    1.0 + 41.9 * part(index(i), 0.569_84)
                 } else {
-                    -4.0 + 53.0 * part(place(i), 0.569_84)
+                    -4.0 + 53.0 * part(index(i), 0.569_84)
                 }
             }),
         };
         let softness =
-            Lanes2 { x: per_lane(|i| part(place(i), 0.324_718)), y: per_lane(|i| part(place(i), 0.220_744)) };
+            Lanes2 { x: per_lane(|i| part(index(i), 0.324_718)), y: per_lane(|i| part(index(i), 0.220_744)) };
         let spline = BlockSpline::texel_neighbourhoods(&position_px, &softness);
         let is_taken = |i: usize| !(block + i).is_multiple_of(7);
         let (mut found, mut exact) = ([[0.0; 8]; LANES], [[0.0; 8]; LANES]);
@@ -85,13 +85,13 @@ fn area_means_equal_their_twin_inside_and_outside_of_the_frame() {
     let part = |i: usize, step: f32| (i as f32 * step).fract();
     // One to six texels along each axis; pixels of a block alike, or each with sides of its own.
     for (block, most) in (0..600).flat_map(|block| [1.0, 1.9, 2.9, 3.9, 5.0].map(|most| (block, most))) {
-        let place = |i: usize| block * LANES + i;
+        let index = |i: usize| block * LANES + i;
         let is_inside_frame = !block.is_multiple_of(3);
         let clamped = |i: usize, step: f32, size: f32| {
             if is_inside_frame {
-                4.0 + (size - 9.0) * part(place(i), step)
+                4.0 + (size - 9.0) * part(index(i), step)
             } else {
-                -6.0 + (size + 12.0) * part(place(i), step)
+                -6.0 + (size + 12.0) * part(index(i), step)
             }
         };
         let position_px = Lanes2 {
@@ -100,7 +100,7 @@ fn area_means_equal_their_twin_inside_and_outside_of_the_frame() {
         };
         let side = |i: usize, step: f32| {
             1.0 + (most - 1.0)
-                * if block.is_multiple_of(2) { part(block, step) } else { part(place(i), step) }
+                * if block.is_multiple_of(2) { part(block, step) } else { part(index(i), step) }
         };
         let sides_px = Lanes2 { x: per_lane(|i| side(i, 0.324_718)), y: per_lane(|i| side(i, 0.220_744)) };
         let is_taken = |i: usize| !(block + i).is_multiple_of(7);

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::*;
 
 fn rays() -> Vec<DVec3> {
-    (0..RAYS).map(ray).map(|(place, phase)| place.extend(phase)).collect()
+    (0..RAYS).map(ray).map(|(position, phase)| position.extend(phase)).collect()
 }
 
 #[test]

@@ -84,8 +84,8 @@ impl<'a> Parallax<'a> {
     /// `None` where nothing is sure.
     fn new(pixels: &'a FramePixels<'a>, target: &FrameCamera) -> Option<Self> {
         let [width, height] = pixels.plan.camera.size_px;
-        let places = [[0, 0], [width / 2, height / 2], [width - 1, height - 1]];
-        let from: Vec<DVec3> = places.map(|pixel| pixels.rays.pose(pixel).position_ned_m).into();
+        let corners = [[0, 0], [width / 2, height / 2], [width - 1, height - 1]];
+        let from: Vec<DVec3> = corners.map(|pixel| pixels.rays.pose(pixel).position_ned_m).into();
         let to: Vec<DVec3> = target.poses().map(|pose| pose.position_ned_m).collect();
         let ways = from.iter().flat_map(|from| to.iter().map(move |to| from.distance(*to)));
         let travel_m = BETWEEN * ways.fold(0.0, f64::max);

@@ -132,7 +132,7 @@ fn with_pixels(sequence: Arc<Sequence>, check: impl FnOnce(&FramePixels<'_>, &Or
 }
 
 #[test]
-fn flow_leads_to_where_the_oracle_sees_the_same_place() {
+fn flow_leads_to_where_the_oracle_sees_the_same_position() {
     with_pixels(sequence(), |pixels, oracle| {
         for target in [2, 0] {
             let to = pixels.planner.frame_camera(i64::from(target)).unwrap();
@@ -194,7 +194,7 @@ fn shown(
         return None;
     }
     let [width, height] = SIZE_PX.map(f64::from);
-    let mut places = Vec::new();
+    let mut sights = Vec::new();
     for (k, pair) in seen.windows(2).enumerate() {
         let &[Some((before, a)), Some((after, b))] = pair else { continue };
         if (before >= 0.0) == (after >= 0.0) {
@@ -211,18 +211,18 @@ fn shown(
             hit.is_some_and(|hit| hit.depth_m < 0.999)
         };
         let is_hidden = hides(DVec3::ZERO);
-        // Near a border the instants between two places of the grid differ.
+        // Near a border the instants between two positions of the grid differ.
         let beside = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y];
         if beside.into_iter().any(|beside| hides(0.02 * beside) != is_hidden) {
             return None;
         }
-        places.push(Sight { px, is_hidden });
+        sights.push(Sight { px, is_hidden });
     }
-    Some(places)
+    Some(sights)
 }
 
 #[test]
-fn of_several_places_the_nearest_that_is_seen_counts() {
+fn of_several_positions_the_nearest_that_is_seen_counts() {
     // A long lens over the raft's edge, which shakes so that rows are overtaken again and again.
     let vibration = [(Axis::Pitch, 60.0), (Axis::Yaw, 55.0)].map(|(axis, hz)| VibrationSpec {
         axis,
@@ -241,18 +241,18 @@ fn of_several_places_the_nearest_that_is_seen_counts() {
             let pixel = pixels.pixel(i).unwrap();
             let from_px = DVec2::from_array(pixel.position.map(f64::from));
             let point = world_point(pixels, pixel);
-            let Some(mut places) = shown(point, &pixels.plan.camera, &instants, oracle) else { continue };
-            places.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
-            let seen: Vec<&Sight> = places.iter().filter(|place| !place.is_hidden).collect();
-            let (expected, place) = match (seen.as_slice(), places.first()) {
+            let Some(mut sights) = shown(point, &pixels.plan.camera, &instants, oracle) else { continue };
+            sights.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
+            let seen: Vec<&Sight> = sights.iter().filter(|sight| !sight.is_hidden).collect();
+            let (expected, sight) = match (seen.as_slice(), sights.first()) {
                 ([], None) => (FlowState::Outside, None),
                 ([], nearest) => (FlowState::Occluded, nearest),
                 ([only], _) => (FlowState::Visible, Some(*only)),
                 ([nearest, ..], _) => (FlowState::Several, Some(*nearest)),
             };
             assert_eq!(state, f32::from(expected as u8), "{from_px}");
-            if let Some(place) = place {
-                let off_px = (from_px + DVec2::new(dx.into(), dy.into())).distance(place.px);
+            if let Some(sight) = sight {
+                let off_px = (from_px + DVec2::new(dx.into(), dy.into())).distance(sight.px);
                 assert!(off_px < 0.02, "{from_px}: {off_px:.1e} px");
             }
             states[expected as usize] += 1;
@@ -263,7 +263,7 @@ fn of_several_places_the_nearest_that_is_seen_counts() {
 }
 
 #[test]
-fn motion_and_blur_are_those_of_the_moved_place() {
+fn motion_and_blur_are_those_of_the_moved_position() {
     with_pixels(sequence(), |pixels, oracle| {
         let (path, camera) = (&oracle.sequence().path, &pixels.plan.camera);
         let mut count = 0;
@@ -280,8 +280,8 @@ fn motion_and_blur_are_those_of_the_moved_place() {
             let shown = |t_s: f64| {
                 let now = raft.at(t_s);
                 let local = DVec3::new(15.0 * (1.0 - 2.0 * v), 15.0 * (2.0 * u - 1.0), 0.0);
-                let place = now.origin_ned_m + now.ned_from_shape * local;
-                camera.show(&path.pose(t_s), t_s, WorldPoint::At(place)).unwrap().0
+                let point_ned_m = now.origin_ned_m + now.ned_from_shape * local;
+                camera.show(&path.pose(t_s), t_s, WorldPoint::At(point_ned_m)).unwrap().0
             };
             let (t_s, h) = (sample.t_s, 1e-4);
             let expected = (shown(t_s + h) - shown(t_s - h)) / (2.0 * h);

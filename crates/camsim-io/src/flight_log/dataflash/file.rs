@@ -18,12 +18,12 @@ pub(super) struct Message<'a> {
     /// Number in the file (from 1) and bytes behind the head.
     pub(super) records: Vec<(usize, &'a [u8])>,
     columns: HashMap<String, Column>,
-    /// Places and lengths of columns of text.
+    /// Offsets and lengths of columns of text.
     texts: HashMap<String, (usize, usize)>,
     length: usize,
 }
 
-/// Place, type and unit of a column.
+/// Offset, type and unit of a column.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Column {
     offset: usize,

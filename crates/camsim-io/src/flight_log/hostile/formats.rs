@@ -146,14 +146,14 @@ fn ulog(rows: &[LocalPosition]) -> Vec<u8> {
     );
     message(b'A', b"\0\0\0vehicle_attitude");
     message(b'A', b"\0\x01\0vehicle_local_position");
-    for (time, place, valid, resets) in rows {
+    for (time, ned, valid, resets) in rows {
         let mut attitude = vec![0, 0];
         attitude.extend(time.to_le_bytes());
         [1.0_f32, 0.0, 0.0, 0.0].iter().for_each(|q| attitude.extend(q.to_le_bytes()));
         message(b'D', &attitude);
         let mut position = vec![1, 0];
         position.extend(time.to_le_bytes());
-        [9.0_f32].iter().chain(place).for_each(|x| position.extend(x.to_le_bytes()));
+        [9.0_f32].iter().chain(ned).for_each(|x| position.extend(x.to_le_bytes()));
         position.extend([*valid, *resets]);
         message(b'D', &position);
     }

@@ -39,7 +39,7 @@ fn flight_records_are_read_or_refused_line_by_line() {
     for (bad, word) in [
         ("2459594700000N00800000EA0050000540", "time"),
         ("2359594760000N00800000EA0050000540", "latitude"),
-        ("2359599100000N00800000EA0050000540", "place"),
+        ("2359599100000N00800000EA0050000540", "position"),
         ("2359594700000X00800000EA0050000540", "hemisphere"),
         ("2359594700000N00800000EA00x0000540", "height"),
         ("2359594700000N00800000EA00500", "cut off"),
@@ -70,7 +70,7 @@ fn kml_without_times_or_heights_is_refused() {
     let good = track_of(&format!("{}{}{}{}", when(0), when(1), at("47"), at("47.0001")));
     let log = read_named("a.kml", good.as_bytes(), &spec()).unwrap();
     assert_eq!((log.rows.len(), warnings(&log).as_str()), (2, ""));
-    // A missing place is an empty coordinate.
+    // A missing position is an empty coordinate.
     let missing = track_of(&format!("{}{}{}<gx:coord></gx:coord>", when(0), when(1), at("47")));
     assert_eq!(read_named("a.kml", missing.as_bytes(), &spec()).unwrap().report.unusable.count, 1);
     let point = "<TimeStamp><when>2023-05-01T10:00:00Z</when></TimeStamp><Point>\

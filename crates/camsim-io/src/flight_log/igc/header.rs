@@ -97,7 +97,7 @@ impl Header {
         let name = letters.trim_start_matches(|c: char| c.is_ascii_digit());
         let code = &letters[..letters.len() - name.len()];
         let name = strip(strip(name, "GPS"), "DATUM");
-        // The number of the datum may stand in the place of its name.
+        // The number of the datum may stand instead of its name.
         let (code, name) = if name.parse::<u32>().is_ok() { (name, "") } else { (code, name) };
         let is_known = if name.is_empty() { ["", "100"].contains(&code) } else { is_wgs84(name) };
         if !is_known {

@@ -46,7 +46,7 @@ impl Topic<'_> {
     }
 }
 
-/// Place and type of a field.
+/// Offset and type of a field.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UlogField {
     offset: usize,
@@ -175,7 +175,7 @@ impl<'a> UlogFile<'a> {
         }
     }
 
-    /// Finds the places of all numbers of a format. What stands behind a field of unknown type has none.
+    /// Finds the offsets of all numbers of a format. What stands behind a field of unknown type has none.
     fn lay_out(
         &self,
         format: &str,

@@ -15,7 +15,7 @@ const EARTH_RADIUS_M: f64 = 6_371_000.0;
 
 /// The fields of a position.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Place {
+pub(super) enum PositionFields {
     /// Latitude and longitude with a factor to degrees, and heights with a factor to metres.
     Geodetic {
         plane: [UlogField; 2],
@@ -28,7 +28,7 @@ pub(super) enum Place {
     Local([UlogField; 3]),
 }
 
-impl Place {
+impl PositionFields {
     pub(super) fn of(topic: &Topic<'_>) -> Option<Self> {
         let both = |a: &str, b: &str| Some([topic.field(a)?, topic.field(b)?]);
         if let Some(plane) = both("latitude_deg", "longitude_deg") {
@@ -53,7 +53,7 @@ impl Place {
 #[derive(Debug)]
 pub(super) struct PositionReader {
     time: UlogField,
-    place: Place,
+    fields: PositionFields,
     /// Quality of the fix of a receiver.
     fix: Option<UlogField>,
     /// Whether a position is valid.
@@ -71,12 +71,12 @@ pub(super) struct PositionReader {
 
 impl PositionReader {
     pub(super) fn new(topic: &Topic<'_>, spec: &FlightSpec, notes: &mut Vec<Note>) -> Result<Self, String> {
-        let place = Place::of(topic).ok_or_else(|| format!("`{}` has no positions", topic.name))?;
+        let fields = PositionFields::of(topic).ok_or_else(|| format!("`{}` has no positions", topic.name))?;
         let time = time_field(topic)?;
         let all = |names: &[&str]| names.iter().filter_map(|name| topic.field(name)).collect::<Vec<_>>();
-        let reference = match place {
-            Place::Local(_) => reference_fields(topic),
-            Place::Geodetic { .. } => None,
+        let reference = match fields {
+            PositionFields::Local(_) => reference_fields(topic),
+            PositionFields::Geodetic { .. } => None,
         };
         let has_ellipsoid = |field: UlogField| {
             topic.messages.iter().any(|(_, message)| {
@@ -85,8 +85,8 @@ impl PositionReader {
             })
         };
         let uses_ellipsoid = spec.height == HeightReference::Ellipsoid
-            && matches!(place, Place::Geodetic { ellipsoid: Some(field), .. } if has_ellipsoid(field));
-        let is_geodetic = reference.is_some() || matches!(place, Place::Geodetic { .. });
+            && matches!(fields, PositionFields::Geodetic { ellipsoid: Some(field), .. } if has_ellipsoid(field));
+        let is_geodetic = reference.is_some() || matches!(fields, PositionFields::Geodetic { .. });
         if is_geodetic && !uses_ellipsoid {
             notes.extend(streams::height_note(
                 &format!("heights of `{}`", topic.name),
@@ -94,8 +94,8 @@ impl PositionReader {
                 spec,
             ));
         }
-        let quaternion = match place {
-            Place::Local(_) if topic.field("position[0]").is_some() => {
+        let quaternion = match fields {
+            PositionFields::Local(_) if topic.field("position[0]").is_some() => {
                 let frame = topic.field("pose_frame").or(topic.field("local_frame"));
                 let frames: Vec<f64> = frame
                     .map_or(Vec::new(), |frame| topic.messages.iter().map(|(_, m)| frame.read(m)).collect());
@@ -110,7 +110,7 @@ impl PositionReader {
         }
         Ok(Self {
             time,
-            place,
+            fields,
             fix: topic.field("fix_type"),
             valid,
             dead_reckoning: topic.field("dead_reckoning"),
@@ -128,7 +128,7 @@ impl PositionReader {
     }
 
     pub(super) fn is_geodetic(&self) -> bool {
-        self.reference.is_some() || matches!(self.place, Place::Geodetic { .. })
+        self.reference.is_some() || matches!(self.fields, PositionFields::Geodetic { .. })
     }
 
     /// The positions; those that the log itself calls invalid are left out, with a note.
@@ -183,8 +183,8 @@ impl PositionReader {
     }
 
     fn position(&self, message: &[u8]) -> [f64; 3] {
-        match self.place {
-            Place::Geodetic { plane: [lat, lon], plane_factor, msl, ellipsoid, height_factor } => {
+        match self.fields {
+            PositionFields::Geodetic { plane: [lat, lon], plane_factor, msl, ellipsoid, height_factor } => {
                 let height = if self.uses_ellipsoid { ellipsoid.unwrap_or(msl) } else { msl };
                 [
                     lat.read(message) * plane_factor,
@@ -192,7 +192,7 @@ impl PositionReader {
                     height.read(message) * height_factor,
                 ]
             }
-            Place::Local(fields) => {
+            PositionFields::Local(fields) => {
                 let ned = fields.map(|field| field.read(message));
                 match self.reference {
                     Some(reference) => geodetic_from_local(ned, reference.map(|field| field.read(message))),

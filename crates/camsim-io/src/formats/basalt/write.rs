@@ -4,12 +4,12 @@ use serde_json::{Map, Value, json};
 
 use super::{LENSES, RADTAN8};
 use crate::formats::named_lens::NamedLens;
-use crate::formats::writing::exported::{Content, Place, Writer};
+use crate::formats::writing::exported::{Content, Field, Writer};
 use crate::formats::writing::{Calibration, CalibrationError, ImuReference};
 use crate::text::numbers::xyzw;
 
 pub(crate) const WRITER: Writer =
-    Writer::new("basalt", "calibration.json", Content::Rig(json), &[Place::Pose, Place::TimeShift]);
+    Writer::new("basalt", "calibration.json", Content::Rig(json), &[Field::Pose, Field::TimeShift]);
 
 /// The file of all cameras.
 ///

@@ -6,7 +6,7 @@ use camsim_core::scenario::Readout;
 
 use super::{LENSES, intrinsic_keys};
 use crate::formats::named_lens::NamedLens;
-use crate::formats::writing::exported::{Content, Place, Writer};
+use crate::formats::writing::exported::{Content, Field, Writer};
 use crate::formats::writing::{Calibration, CalibrationError, ImuReference, Intrinsics};
 use crate::text::numbers::{Element, opencv_matrix, real};
 
@@ -14,7 +14,7 @@ pub(crate) const WRITER: Writer = Writer::new(
     "vins",
     "camera.yaml",
     Content::One(settings),
-    &[Place::Name, Place::Pose, Place::TimeShift, Place::Readout(&[Readout::TopToBottom])],
+    &[Field::Name, Field::Pose, Field::TimeShift, Field::Readout(&[Readout::TopToBottom])],
 );
 
 /// The file of one camera.

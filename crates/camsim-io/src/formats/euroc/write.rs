@@ -1,7 +1,7 @@
 //! `sensor.yaml` of EuRoC/ASL.
 
 use crate::formats::axes::Rigid;
-use crate::formats::writing::exported::{Content, Place, Writer};
+use crate::formats::writing::exported::{Content, Field, Writer};
 use crate::formats::writing::lens_names::Family;
 use crate::formats::writing::{Calibration, CalibrationError, lens_names};
 use crate::text::numbers::{list, matrix_list, real};
@@ -14,7 +14,7 @@ pub(crate) const WRITER: Writer = Writer {
         Content::One(|camera, body| {
             sensor_yaml(camera, &body.body_from_imu.inverse().of(&camera.body_from_camera()))
         }),
-        &[Place::Pose, Place::Rate],
+        &[Field::Pose, Field::Rate],
     )
 };
 

@@ -15,7 +15,7 @@ pub(crate) struct CsvRows {
     path: PathBuf,
     reader: csv::Reader<File>,
     header: csv::StringRecord,
-    /// Places of the cells of each asked column.
+    /// Indices of the cells of each asked column.
     columns: Vec<Vec<usize>>,
     record: csv::StringRecord,
 }
@@ -28,13 +28,13 @@ impl CsvRows {
             fail(format!("cannot be read: {error}; render the folder again with --resume"))
         })?;
         let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
-        let place = |name: String| {
+        let index_of = |name: String| {
             header.iter().position(|column| column == name).ok_or_else(|| {
                 fail(format!("has no column {name}: it is not a table of this version of camsim"))
             })
         };
-        let places = |column: &&str| cells::<R>(column).into_iter().map(place).collect();
-        let columns = columns.iter().map(places).collect::<Result<_, _>>()?;
+        let cells_of = |column: &&str| cells::<R>(column).into_iter().map(index_of).collect();
+        let columns = columns.iter().map(cells_of).collect::<Result<_, _>>()?;
         Ok(Self { path: path.into(), reader, header, columns, record: csv::StringRecord::new() })
     }
 
@@ -51,9 +51,9 @@ impl CsvRows {
             .map_err(|error| DatasetError::Input { path: path.clone(), message: error.to_string() })
     }
 
-    /// A cell by its place in the file.
-    pub(crate) fn cell(&self, place: usize) -> &str {
-        self.record.get(place).unwrap_or_default()
+    /// A cell by its index in the row.
+    pub(crate) fn cell(&self, index: usize) -> &str {
+        self.record.get(index).unwrap_or_default()
     }
 
     /// The first cell of the i-th of the asked columns.
@@ -61,9 +61,9 @@ impl CsvRows {
         self.cell(self.columns[i][0])
     }
 
-    fn bad(&self, place: usize, wanted: &str) -> DatasetError {
+    fn bad(&self, index: usize, wanted: &str) -> DatasetError {
         let line = self.record.position().map_or(0, csv::Position::line);
-        let (name, text) = (self.header.get(place).unwrap_or_default(), self.cell(place));
+        let (name, text) = (self.header.get(index).unwrap_or_default(), self.cell(index));
         DatasetError::Input {
             path: self.path.clone(),
             message: format!(
@@ -75,9 +75,9 @@ impl CsvRows {
     /// Finite numbers, as many as the i-th column has cells.
     fn numbers<const N: usize>(&self, i: usize) -> Result<[f64; N], DatasetError> {
         let mut values = [0.0; N];
-        for (value, &place) in values.iter_mut().zip(&self.columns[i]) {
-            let finite = self.cell(place).parse().ok().filter(|value: &f64| value.is_finite());
-            *value = finite.ok_or_else(|| self.bad(place, "a number"))?;
+        for (value, &index) in values.iter_mut().zip(&self.columns[i]) {
+            let finite = self.cell(index).parse().ok().filter(|value: &f64| value.is_finite());
+            *value = finite.ok_or_else(|| self.bad(index, "a number"))?;
         }
         Ok(values)
     }

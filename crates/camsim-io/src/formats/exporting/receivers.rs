@@ -14,9 +14,9 @@ use camsim_core::sensors::GnssSample;
 pub(crate) fn write(job: &ExportJob<'_>, body_from_b: &Rigid) -> Result<Vec<String>, DatasetError> {
     let mut names: Vec<String> = Vec::new();
     for sensor in descriptions(job.run)?.into_iter().filter(|sensor| sensor.kind != "imu") {
-        let place = format!("mav0/{}", sensor.kind);
-        let number = names.iter().filter(|name| name.starts_with(&place)).count();
-        let folder = format!("{place}{number}");
+        let prefix = format!("mav0/{}", sensor.kind);
+        let number = names.iter().filter(|name| name.starts_with(&prefix)).count();
+        let folder = format!("{prefix}{number}");
         write_table(job, &sensor, &format!("{folder}/data.csv"))?;
         let b_from_sensor = body_from_b.inverse().of(&sensor.body_from_sensor());
         let yaml = format!(

@@ -51,7 +51,7 @@ pub fn require(scenario: &mut Scenario, format: DatasetFormat) -> Result<Vec<Str
 /// Judges the lens of a camera before anything is rendered.
 ///
 /// # Errors
-/// The layout has no place for it.
+/// The layout cannot hold it.
 pub fn judge_lens(camera: &CameraSpec, format: DatasetFormat) -> Result<(), DatasetError> {
     layout(format).judge.map_or(Ok(()), |judge| Ok(judge(&Calibration::new(camera)?)?))
 }

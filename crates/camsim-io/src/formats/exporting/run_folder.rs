@@ -232,17 +232,17 @@ impl RunCamera {
     /// Whether every frame has a file in this column.
     #[must_use]
     pub fn has(&self, column: &str) -> bool {
-        self.place(column).is_some_and(|place| self.frames.iter().all(|frame| !frame.files[place].is_empty()))
+        self.index(column).is_some_and(|index| self.frames.iter().all(|frame| !frame.files[index].is_empty()))
     }
 
-    fn place(&self, column: &str) -> Option<usize> {
+    fn index(&self, column: &str) -> Option<usize> {
         self.columns.iter().position(|known| known == column)
     }
 
     /// Path of a frame's file; empty if there is none.
     #[must_use]
     pub fn file(&self, frame: &RunFrame, column: &str) -> PathBuf {
-        let name = self.place(column).map_or("", |place| frame.files[place].as_str());
+        let name = self.index(column).map_or("", |index| frame.files[index].as_str());
         if name.is_empty() { PathBuf::new() } else { self.folder.join(name) }
     }
 
@@ -329,7 +329,7 @@ impl RunCamera {
     /// Camera matrix and lens.
     ///
     /// # Errors
-    /// The camera zooms: no layout has a place for that.
+    /// The camera zooms: no layout can hold that.
     pub fn intrinsics(&self) -> Result<Intrinsics, DatasetError> {
         Ok(Intrinsics::of(&self.spec)?)
     }
@@ -366,18 +366,18 @@ fn read_frames(path: &Path, nominal_ms: f64) -> Result<(Vec<String>, Vec<RunFram
     let columns = ["frame", "stamp_ns", "position_ned_m", "ned_from_camera_wxyz"];
     let mut rows = CsvRows::open::<FrameRecord>(path, &columns)?;
     let header: Vec<String> = rows.header().iter().map(str::to_owned).collect();
-    let place = |of: &str| header.iter().position(|name| name == of);
-    let (instant, exposure) = (place("instant"), place("exposure_ms"));
+    let index = |of: &str| header.iter().position(|name| name == of);
+    let (instant, exposure) = (index("instant"), index("exposure_ms"));
     // Those of values stand before them.
     let values: Vec<String> = FrameRecord::COLUMNS.iter().flat_map(Column::names).collect();
     let first = header.iter().take_while(|name| values.contains(name)).count();
     let columns = header[first..].to_vec();
     let mut frames = Vec::new();
     while rows.advance()? {
-        let own_ms = |place: usize| rows.cell(place).parse().ok();
+        let own_ms = |index: usize| rows.cell(index).parse().ok();
         frames.push(RunFrame {
             number: rows.whole(0)?,
-            instant: instant.and_then(|place| rows.cell(place).parse().ok()),
+            instant: instant.and_then(|index| rows.cell(index).parse().ok()),
             stamp_ns: rows.whole(1)?,
             pose: CameraPose { position_ned_m: rows.vector(2)?, ned_from_camera: rows.wxyz(3)? },
             // Pictures of one instant have no exposure time, however long they collect light.

@@ -20,7 +20,7 @@ pub(crate) fn name_s(t_ns: i64) -> String {
     format!("{:010}.{:09}", t_ns / SECOND_NS, t_ns % SECOND_NS)
 }
 
-/// The run with stamps that the layout has a place for: so many whole seconds later that none is before 0; and a note
+/// The run with stamps that the layout can hold: so many whole seconds later that none is before 0; and a note
 /// that says so.
 pub(crate) fn fitted(
     run: &RunFolder,

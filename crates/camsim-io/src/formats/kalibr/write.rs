@@ -4,23 +4,23 @@ use std::fmt::Write as _;
 
 use camsim_core::scenario::{LensModel, Readout};
 
-use crate::formats::writing::exported::{Content, Place, Writer};
+use crate::formats::writing::exported::{Content, Field, Writer};
 use crate::formats::writing::lens_names::Family;
 use crate::formats::writing::{Calibration, CalibrationError, ImuReference, lens_names};
 use crate::text::numbers::{list, matrix_rows, real};
 
-const PLACES: &[Place] = &[
-    Place::Number,
-    Place::Pose,
-    Place::TimeShift,
-    Place::Readout(&[Readout::TopToBottom, Readout::BottomToTop]),
+const FIELDS: &[Field] = &[
+    Field::Number,
+    Field::Pose,
+    Field::TimeShift,
+    Field::Readout(&[Readout::TopToBottom, Readout::BottomToTop]),
 ];
 
 pub(crate) const WRITER: Writer = Writer::new(
     "kalibr",
     "camchain.yaml",
     Content::Rig(|cameras, imu| chain_yaml(cameras, Some(imu), PoseKey::CamImu)),
-    PLACES,
+    FIELDS,
 );
 
 /// OpenVINS'.
@@ -30,7 +30,7 @@ pub(crate) const OPENVINS_WRITER: Writer = Writer::new(
     Content::Rig(|cameras, imu| {
         Ok(format!("%YAML:1.0\n\n{}", chain_yaml(cameras, Some(imu), PoseKey::ImuCam)?))
     }),
-    PLACES,
+    FIELDS,
 );
 
 /// The key of the pose of a camera and its inertial sensor.

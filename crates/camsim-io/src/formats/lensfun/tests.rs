@@ -174,7 +174,7 @@ fn colors_are_scaled_as_lensfun_has_it() {
 fn vignetting_is_lensfuns() {
     // What lensfun 0.3.4 (lensfunpy 1.18, Modifier.apply_color_modification) divides a picture of 601 x 401 by,
     // at pixels (0, 0), (100, 50), (300, 0), (600, 200), whose centres it counts from the middle one's.
-    let places = [(300.0, 200.0), (200.0, 150.0), (0.0, 200.0), (300.0, 0.0)];
+    let positions = [(300.0, 200.0), (200.0, 150.0), (0.0, 200.0), (300.0, 0.0)];
     let golden: [(f64, f64, f64, f64, [f64; 4]); 6] = [
         (20.0, 4.0, 10.0, 1.534, [0.799_999_95, 0.878_883_00, 0.917_159_02, 0.840_235_77]),
         (20.0, 4.0, 1000.0, 1.534, [0.769_999_98, 0.869_356_45, 0.911_369_26, 0.824_546_05]),
@@ -186,7 +186,7 @@ fn vignetting_is_lensfuns() {
     for (focal_mm, aperture, distance_m, crop, expected) in golden {
         let camera = import_at("Zoom 20-80mm f/4", focal_mm, Some(crop), Some(aperture), distance_m).unwrap();
         let found = camera.spec.photometric.vignetting.unwrap();
-        for ((x, y), expected) in places.into_iter().zip(expected) {
+        for ((x, y), expected) in positions.into_iter().zip(expected) {
             let r2 = (x * x + y * y) / (300.0 * 300.0 + 200.0 * 200.0_f64);
             let terms = found.polynomial.iter().rev();
             let weight = 1.0 + r2 * terms.fold(0.0, |sum, k| sum * r2 + k);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::LENSES;
 use crate::formats::axes::Rigid;
 use crate::formats::named_lens::NamedLens;
-use crate::formats::writing::exported::{Content, Place, Writer};
+use crate::formats::writing::exported::{Content, Field, Writer};
 use crate::formats::writing::{Calibration, CalibrationError, ImuReference, Intrinsics};
 use crate::text::numbers::{Element, opencv_matrix, real};
 
@@ -13,7 +13,7 @@ pub(crate) const WRITER: Writer = Writer::new(
     "orbslam3",
     "orb_slam3.yaml",
     Content::Rig(|all, imu| cameras(all, Some(imu))),
-    &[Place::Pose, Place::WholeRate],
+    &[Field::Pose, Field::WholeRate],
 );
 
 /// The cameras, one or two, with the pose of the first in the inertial sensor.

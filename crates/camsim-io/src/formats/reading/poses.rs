@@ -40,7 +40,7 @@ pub(crate) enum Placement {
     InFirst(Rigid),
 }
 
-/// What a file says of a camera's place and clock.
+/// What a file says of a camera's pose and clock.
 #[derive(Debug, Default)]
 pub(crate) struct Extrinsics {
     pub(crate) placement: Option<Placement>,

@@ -1,12 +1,12 @@
 //! ROS `camera_info`: the YAML file of `camera_calibration`.
 
-use crate::formats::writing::exported::{Content, Place, Writer};
+use crate::formats::writing::exported::{Content, Field, Writer};
 use crate::formats::writing::lens_names::Family;
 use crate::formats::writing::{Calibration, CalibrationError, Intrinsics, lens_names};
 use crate::text::numbers::list;
 
 pub(crate) const WRITER: Writer =
-    Writer::new("ros", "camera_info.yaml", Content::One(|camera, _| file(camera)), &[Place::Name]);
+    Writer::new("ros", "camera_info.yaml", Content::One(|camera, _| file(camera)), &[Field::Name]);
 
 /// The file of one camera.
 fn file(camera: &Calibration) -> Result<String, CalibrationError> {

@@ -76,16 +76,16 @@ fn write_group<R: TableRow, W: std::io::Write + Send>(
     for k in 0..all.names().count() {
         let (mut texts, mut wholes, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
         for row in rows {
-            let mut place = 0;
+            let mut number = 0;
             all.each_cell(row, &mut |cell| {
                 match cell {
-                    _ if place != k => {}
+                    _ if number != k => {}
                     Cell::Text(value) => texts.push(ByteArray::from(value)),
                     Cell::Whole(value) => wholes.push(value),
                     Cell::Number(value) => numbers.push(value),
                     Cell::Empty => numbers.push(f64::NAN),
                 }
-                place += 1;
+                number += 1;
             });
         }
         let Some(mut column) = columns.next_column()? else { break };

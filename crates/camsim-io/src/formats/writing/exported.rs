@@ -1,4 +1,4 @@
-//! The formats, and what each has no place for.
+//! The formats, and what each cannot hold.
 
 use camsim_core::{
     pose::FLU_FROM_FRD,
@@ -16,8 +16,8 @@ pub(crate) struct Writer {
     /// The usual name of its file.
     pub(crate) file_name: &'static str,
     pub(crate) content: Content,
-    /// What it has a place for, beside camera matrix and lens: a lens that it does not have is an error.
-    pub(crate) places: &'static [Place],
+    /// What it has a field for, beside camera matrix and lens: a lens that it does not have is an error.
+    pub(crate) fields: &'static [Field],
     /// What readers of the file should know.
     pub(crate) note: fn(&Calibration) -> Option<String>,
 }
@@ -32,9 +32,9 @@ pub(crate) enum Content {
     Pictures(fn(&Calibration) -> Result<[CalibrationFile; 2], CalibrationError>),
 }
 
-/// Something that a format may have a place for.
+/// Something that a format may have a field for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Place {
+pub(crate) enum Field {
     Name,
     /// Names `cam0`, `cam1`, ... by the order of the cameras.
     Number,
@@ -52,31 +52,31 @@ impl Writer {
         name: &'static str,
         file_name: &'static str,
         content: Content,
-        places: &'static [Place],
+        fields: &'static [Field],
     ) -> Self {
-        Self { name, file_name, content, places, note: |_| None }
+        Self { name, file_name, content, fields, note: |_| None }
     }
 
     /// Whether it has the readout of a camera.
     fn has_readout(&self, spec: &CameraSpec) -> bool {
-        let is_held = |place: &Place| match place {
-            Place::Readout(directions) => directions.contains(&spec.shutter.readout),
+        let is_held = |field: &Field| match field {
+            Field::Readout(directions) => directions.contains(&spec.shutter.readout),
             _ => false,
         };
         // Rows that begin at once are exposed half as far apart as they are read, which no format says.
-        spec.shutter.reset != Reset::Global && self.places.iter().any(is_held)
+        spec.shutter.reset != Reset::Global && self.fields.iter().any(is_held)
     }
 
-    /// Whether the file holds a key of the camera at a place.
+    /// Whether the file holds a key of the camera at an index.
     fn holds(&self, spec: &CameraSpec, i: usize, key: &str) -> bool {
-        let has = |place| self.places.contains(&place);
+        let has = |field| self.fields.contains(&field);
         match key {
             "size_px" | "focal_px" | "principal_point_px" => true,
-            "name" => has(Place::Name) || has(Place::Number) && spec.name == format!("cam{i}"),
-            "fps" => has(Place::Rate) || has(Place::WholeRate) && spec.fps.fract() == 0.0,
-            "clock_offset_ms" | "shutter.delay_ms" => has(Place::TimeShift),
+            "name" => has(Field::Name) || has(Field::Number) && spec.name == format!("cam{i}"),
+            "fps" => has(Field::Rate) || has(Field::WholeRate) && spec.fps.fract() == 0.0,
+            "clock_offset_ms" | "shutter.delay_ms" => has(Field::TimeShift),
             "shutter.readout_ms" | "shutter.readout" | "shutter.line_time_us" => self.has_readout(spec),
-            "mount.angles_deg" | "mount.offset_m" => has(Place::Pose),
+            "mount.angles_deg" | "mount.offset_m" => has(Field::Pose),
             key => key.starts_with("lens"),
         }
     }
@@ -104,7 +104,7 @@ pub struct CalibrationFile {
 pub struct Exported {
     /// Its files; one, but for STmaps.
     pub files: Vec<CalibrationFile>,
-    /// What the format has no place for, and what it has in another form.
+    /// What the format cannot hold, and what it has in another form.
     pub notes: Vec<String>,
 }
 
@@ -144,13 +144,13 @@ fn notes(cameras: &[Calibration], writer: &Writer) -> Result<Vec<String>, Calibr
         let lost = lost(spec, i, writer)?;
         if !lost.is_empty() {
             notes.push(format!(
-                "left out of {}, which has no place for it: {} of {}",
+                "left out of {}, which cannot hold it: {} of {}",
                 writer.name,
                 lost.join(", "),
                 camera.label()
             ));
         }
-        if writer.places.contains(&Place::TimeShift) && spec.shutter.delay_ms != 0.0 {
+        if writer.fields.contains(&Field::TimeShift) && spec.shutter.delay_ms != 0.0 {
             notes.push(format!(
                 "shutter.delay_ms and clock_offset_ms of {} are written as one shift of its stamps: read back, it is a \
                  clock_offset_ms of {}",
@@ -160,13 +160,13 @@ fn notes(cameras: &[Calibration], writer: &Writer) -> Result<Vec<String>, Calibr
         }
     }
     notes.extend(cameras.iter().filter_map(writer.note));
-    if writer.places.contains(&Place::Pose) {
+    if writer.fields.contains(&Field::Pose) {
         notes.push("poses refer to the platform as x forward, y left, z up".to_owned());
     }
     Ok(notes)
 }
 
-/// Keys of a camera, by its place in the file, that differ from the default and that a format does not hold, with
+/// Keys of a camera, by its index in the file, that differ from the default and that a format does not hold, with
 /// their values.
 fn lost(spec: &CameraSpec, i: usize, writer: &Writer) -> Result<Vec<String>, CalibrationError> {
     let table = |spec: &CameraSpec| {

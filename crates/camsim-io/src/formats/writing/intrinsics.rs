@@ -26,7 +26,7 @@ impl Intrinsics {
     /// Those of a camera with a fixed lens.
     ///
     /// # Errors
-    /// The camera zooms: no format has a place for that.
+    /// The camera zooms: no format can hold that.
     pub fn of(spec: &CameraSpec) -> Result<Self, CalibrationError> {
         let CameraSpec { name, size_px, focal_px, principal_point_px, zoom, lens, .. } = spec;
         if !zoom.is_empty() {
@@ -42,7 +42,7 @@ impl Intrinsics {
             // The only model here whose left-out coefficient is not zero.
             coefficients[1] = 1.0;
         }
-        coefficients.iter_mut().zip(&lens.coefficients).for_each(|(place, value)| *place = *value);
+        coefficients.iter_mut().zip(&lens.coefficients).for_each(|(slot, value)| *slot = *value);
         Ok(Self {
             size_px: *size_px,
             focal_px: *focal_px,

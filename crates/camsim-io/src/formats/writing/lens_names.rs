@@ -71,7 +71,7 @@ pub(crate) fn euroc_note(camera: &Calibration, label: &str) -> Option<String> {
     let (name, _) = lens(Family::Euroc, camera).ok().filter(|(name, _)| *name == EIGHT)?;
     Some(format!(
         "sensor.yaml of {label} has the lens as {name} (k1 k2 p1 p2 k3 k4 k5 k6), which OKVIS knows; readers that know \
-         EuRoC's own radial-tangential alone have no place for k3: give them a lens of k1 k2 p1 p2 or pictures without lens ({TWIN_ADVICE})"
+         EuRoC's own radial-tangential alone have no field for k3: give them a lens of k1 k2 p1 p2 or pictures without lens ({TWIN_ADVICE})"
     ))
 }
 

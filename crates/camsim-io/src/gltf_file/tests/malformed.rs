@@ -158,7 +158,7 @@ fn missing_elements_and_files_are_reported_with_their_json_path() {
         let error = read_with(&changes).unwrap_err();
         assert!(error.contains(wanted), "{changes:?}\n  gives {error}\n  not   {wanted}");
     }
-    // An error that occurs in many places is listed for some.
+    // An error that occurs at many locations is listed for some.
     let mut many = valid_model(&png(4, 4));
     let mut primitive = many.json.pointer(PRIMITIVE).unwrap().clone();
     primitive["material"] = json!(7);

@@ -101,8 +101,8 @@ fn wrong_classes_are_refused_with_what_there_is() {
 #[test]
 fn more_objects_than_a_picture_can_number_are_refused_if_they_are_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let places: String = (0..33_000).map(|i| format!("{i},0,0\n")).collect();
-    std::fs::write(folder.path().join("many.csv"), format!("n_m,e_m,d_m\n{places}")).unwrap();
+    let rows: String = (0..33_000).map(|i| format!("{i},0,0\n")).collect();
+    std::fs::write(folder.path().join("many.csv"), format!("n_m,e_m,d_m\n{rows}")).unwrap();
     let text = format!("{MODEL}objects = \"node\"\nplacements = \"many.csv\"\n");
     assert_eq!(load(folder.path(), &text).unwrap().sequence.scene.objects.len(), 66_000);
     let error = load(folder.path(), &format!("{text}[output]\nchannels = [\"class\"]\n")).unwrap_err();

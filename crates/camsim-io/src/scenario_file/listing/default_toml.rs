@@ -15,7 +15,7 @@ const HEAD: &str = "\
 
 /// Keys that are no fields of a scenario.
 const RIG: &str = "
-# [[cameras]]                       # in place of [camera]: several cameras on the platform, each with all keys of [camera] (docs/guide/RIGS.md)
+# [[cameras]]                       # instead of [camera]: several cameras on the platform, each with all keys of [camera] (docs/guide/RIGS.md)
 # name = \"left\"                     # required: its folder, and what `--camera left` and `--set cameras.left.fps=10` name
 # file = \"camera.toml\"              # left out: the keys beside it alone; else these replace those of the file
 # mount = { angles_deg = [0.0, -90.0, 0.0], offset_m = [0.0, -0.1, 0.0] }

@@ -20,7 +20,7 @@ pub fn json_schema() -> Value {
         "anyOf": [{ "$ref": "#/definitions/camera" }, { "type": "string" }],
     });
     root["properties"]["cameras"] = json!({
-        "description": "Several cameras on the platform, in place of `camera`.",
+        "description": "Several cameras on the platform, instead of `camera`.",
         "type": "array",
         "items": of_rig,
     });

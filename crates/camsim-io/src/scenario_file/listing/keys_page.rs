@@ -19,7 +19,7 @@ angles radians, unless a key's name says otherwise. `camsim render --print-defau
 const FOOT: &str = "
 ## `[[cameras]]`
 
-Several cameras on the platform, in place of `[camera]`: each has all of its keys, a required `name`, and may have a \
+Several cameras on the platform, instead of `[camera]`: each has all of its keys, a required `name`, and may have a \
 `file` (a CAMERA.toml, whose keys those beside it replace). See [rigs](../guide/RIGS.md).
 
 ## `[randomize]`

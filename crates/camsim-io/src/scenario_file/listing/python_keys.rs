@@ -45,7 +45,7 @@ fn python_type(kind: ValueKind) -> String {
         ValueKind::NumberOrNumbers(_) | ValueKind::NumberOrList => "float | Sequence[float]".to_owned(),
         ValueKind::Points(_) => "Sequence[Sequence[float]]".to_owned(),
         ValueKind::Flag => "bool".to_owned(),
-        // In place of a path there may be an array or table in memory.
+        // Instead of a path there may be an array or table in memory.
         ValueKind::Path => "Path | Any".to_owned(),
         ValueKind::Paths => "Path | Sequence[Path] | Any".to_owned(),
         ValueKind::Text => "str".to_owned(),

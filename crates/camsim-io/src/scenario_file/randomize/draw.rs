@@ -1,4 +1,4 @@
-//! A drawn key: its distribution, and the places in the scenario that get the value.
+//! A drawn key: its distribution, and the keys of the scenario that get the value.
 
 use toml::{Table, Value};
 
@@ -64,7 +64,7 @@ impl Draw {
         }
         let targets = targets(name, tree)?;
         let draw = Self { name: name.into(), targets, law, is_part: false };
-        // Whether values fit the place does not depend on what is drawn.
+        // Whether values fit the keys does not depend on what is drawn.
         let (mut tree, mut drawn) = (tree.clone(), Vec::new());
         match draw.put(&mut tree, defaults, 0, 0, &mut drawn) {
             Ok(()) => Ok(draw),

@@ -101,7 +101,7 @@ impl Law {
         matches!(self, Self::Numbers(_) | Self::Piece(_))
     }
 
-    /// Value `index` of the random numbers called `name`. `base` is the value that stands at its place.
+    /// Value `index` of the random numbers called `name`. `base` is the value that stands at its key.
     pub(super) fn value(
         &self,
         seed: u64,

@@ -140,7 +140,7 @@ fn make_paths_absolute(key: &str, value: &mut Json, tree: &Tree) {
         // A camera file.
         Json::String(path) if is_camera => absolute(path),
         value => {
-            // In its place within a scenario, where paths are known.
+            // At its key within a scenario, where paths are known.
             let mut nested = std::mem::take(value);
             for step in plain.rsplit('.') {
                 nested = Json::Object([(step.to_owned(), nested)].into_iter().collect());

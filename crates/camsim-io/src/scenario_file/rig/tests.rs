@@ -116,7 +116,7 @@ fn camera_files_lie_below_the_keys_of_their_entry() {
     for camera in [left, other] {
         assert_eq!(camera.photometric.vignette.clone().unwrap(), path("cams/v.png"));
     }
-    // Another file in place of a camera keeps the name.
+    // Another file instead of a camera keeps the name.
     fs::write(path("b.toml"), "fps = 3.0\n").unwrap();
     let set = ("cameras.left".to_owned(), path("b.toml").display().to_string());
     let rig = read_rig(&path("s.toml"), &[set], None).unwrap();
@@ -133,7 +133,7 @@ fn camera_files_lie_below_the_keys_of_their_entry() {
 }
 
 #[test]
-fn what_is_no_rig_is_refused_with_its_place() {
+fn what_is_no_rig_is_refused_with_its_position() {
     let both = format!("[camera]\nfps = 3\n{PAIR}");
     for (cameras, wanted) in [
         (both.as_str(), "dir/s.toml:9: cameras: cannot stand beside [camera]"),

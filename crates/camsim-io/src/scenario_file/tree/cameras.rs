@@ -102,7 +102,7 @@ impl Tree {
         Err(ScenarioError::Problems(vec![format!("{}: {CAMERAS}: {problem}", self.location(CAMERAS))]))
     }
 
-    /// A key of `--set` with the number of a camera in place of its name.
+    /// A key of `--set` with the number of a camera instead of its name.
     pub(super) fn with_camera_number(&self, key: &str) -> Result<String, String> {
         let mut steps = key.splitn(3, '.');
         let (first, camera, rest) = (steps.next(), steps.next(), steps.next());
@@ -145,7 +145,7 @@ impl Tree {
         self.names().join(", ")
     }
 
-    /// Another camera, or camera file, in place of one, with its name unless it has its own.
+    /// Another camera, or camera file, instead of one, with its name unless it has its own.
     pub(super) fn put_camera(
         &mut self,
         index: usize,

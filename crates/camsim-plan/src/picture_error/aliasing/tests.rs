@@ -7,12 +7,12 @@ fn told(&BorderReading { width_px, taps, samples_a_pixel, exposure }: &BorderRea
     sum_of_waves(width_px, &square(width_px, taps), exposure)[usize::from(samples_a_pixel > 1)]
 }
 
-/// The same by drawing borders: in all places and directions, each read by the very gather of the twin,
+/// The same by drawing borders: in all positions and directions, each read by the very gather of the twin,
 /// beside the area that it truly covers.
 fn measured(reading: &BorderReading) -> f64 {
     const SIDE: u32 = 40;
     const BORDERS: u32 = 2400;
-    const PLACES: u32 = 24;
+    const GRID: u32 = 24;
     let BorderReading { width_px, taps, samples_a_pixel, exposure } = *reading;
     let area = square(width_px, taps);
     let part = |k: u32, step: f64| (f64::from(k + 1) * step).fract();
@@ -25,9 +25,10 @@ fn measured(reading: &BorderReading) -> f64 {
             DVec2::splat(19.0) + DVec2::new(part(k, 0.618_033_988_749_895), part(k, 0.414_213_562_373_095));
         let border = at.dot(normal) + reach_px * (2.0 * part(k, 0.569_840_290_998_053) - 1.0);
         let lit = |px: DVec2| f64::from(px.dot(normal) < border);
-        let places = if samples_a_pixel == 1 { vec![DVec2::ZERO] } else { SAMPLE_POSITIONS.to_vec() };
-        let shown =
-            |px: DVec2| places.iter().map(|&place| lit(px + place)).sum::<f64>() / places.len() as f64;
+        let positions = if samples_a_pixel == 1 { vec![DVec2::ZERO] } else { SAMPLE_POSITIONS.to_vec() };
+        let shown = |px: DVec2| {
+            positions.iter().map(|&position| lit(px + position)).sum::<f64>() / positions.len() as f64
+        };
         let rgba: Vec<f32> = (0..SIDE * SIDE)
             .flat_map(|i| [shown(DVec2::new(f64::from(i % SIDE), f64::from(i / SIDE))) as f32; 4])
             .collect();
@@ -38,13 +39,12 @@ fn measured(reading: &BorderReading) -> f64 {
             Some((_, samples)) => gather(&nodes, PathStage::Straight, &area, &image, 1e9, samples),
         };
         let instants = if exposure.is_some() { 16 } else { 1 };
-        let inside = (0..PLACES * PLACES * instants).map(|i| {
-            let [x, y] =
-                [i % PLACES, i / PLACES % PLACES].map(|n| (f64::from(n) + 0.5) / f64::from(PLACES) - 0.5);
-            let fraction = (f64::from(i / (PLACES * PLACES)) + 0.5) / f64::from(instants) - 0.5;
+        let inside = (0..GRID * GRID * instants).map(|i| {
+            let [x, y] = [i % GRID, i / GRID % GRID].map(|n| (f64::from(n) + 0.5) / f64::from(GRID) - 0.5);
+            let fraction = (f64::from(i / (GRID * GRID)) + 0.5) / f64::from(instants) - 0.5;
             lit(at + fraction * along + width_px * DVec2::new(x, y))
         });
-        (found.x - inside.sum::<f64>() / f64::from(PLACES * PLACES * instants)).powi(2)
+        (found.x - inside.sum::<f64>() / f64::from(GRID * GRID * instants)).powi(2)
     });
     // A border within reach of a pixel on both sides, in output pixels, crosses 1 of as many.
     squares.sum::<f64>() / f64::from(BORDERS) * 2.0 * reach_px / width_px
@@ -96,22 +96,22 @@ fn error_of_rays_is_that_of_drawn_borders() {
             (DVec2::new(x, y) - 0.5, fraction)
         })
         .collect();
-    let lit = |places: &[(DVec2, f64)], normal: DVec2, along: f64, at: f64| {
-        let lit = places
+    let lit = |positions: &[(DVec2, f64)], normal: DVec2, along: f64, at: f64| {
+        let lit = positions
             .iter()
-            .filter(|(place, fraction)| place.dot(normal) + along * (fraction - 0.5) < at)
+            .filter(|(position, fraction)| position.dot(normal) + along * (fraction - 0.5) < at)
             .count();
-        lit as f64 / places.len() as f64
+        lit as f64 / positions.len() as f64
     };
     for rays in [16, 32, 64, 128, 256] {
-        let places: Vec<(DVec2, f64)> = (0..rays).map(|i| subsample(i, rays)).collect();
+        let positions: Vec<(DVec2, f64)> = (0..rays).map(|i| subsample(i, rays)).collect();
         for path_px in [0.0, 1.5, 3.0, 7.0, 15.0, 30.0] {
             let squares = (0..BORDERS).map(|k| {
                 let normal = DVec2::from_angle(2.0 * PI * part(k, 0.754_877_666_246_693));
                 let along = path_px * (2.0 * PI * part(k, 0.324_717_957_244_746)).cos();
                 let reach_px = 0.5 * (normal.abs().element_sum() + along.abs());
                 let at = reach_px * (2.0 * part(k, 0.569_840_290_998_053) - 1.0);
-                2.0 * reach_px * (lit(&places, normal, along, at) - lit(&all, normal, along, at)).powi(2)
+                2.0 * reach_px * (lit(&positions, normal, along, at) - lit(&all, normal, along, at)).powi(2)
             });
             let found = squares.sum::<f64>() / f64::from(BORDERS);
             let off = missed_by_rays(rays, path_px) / found;

@@ -7,7 +7,7 @@ use crate::ir::{margins, predicted::SilhouetteError, sampling_plan::SamplingPlan
 pub(crate) const RAYS_LEAVE: f64 = 0.42;
 /// Rays for each fine pixel along a side with which that was found.
 const STILL_RAYS: u32 = 16;
-/// How many rays there may be, as powers of two: only then are their places even. Over an exposure twice as
+/// How many rays there may be, as powers of two: only then are their positions even. Over an exposure twice as
 /// many at least.
 const LEAST_RAYS: u32 = 4;
 const MOST_RAYS: u32 = 8;

@@ -118,7 +118,7 @@ fn all_borders_of_thin_bars_are_counted_in_any_direction() {
         // Two borders in 8 px.
         let expected = UNSURE_OF_ALL * margins::SILHOUETTES * margins::SILHOUETTES * 2.0 / 8.0;
         assert!((found.steps / expected - 1.0).abs() < 0.1, "{angle}: {} {expected}", found.steps);
-        // Places 3 px apart along rows and columns see bars 2 px wide or miss them.
+        // Positions 3 px apart along rows and columns see bars 2 px wide or miss them.
         assert!(found.fraction > 0.75, "{angle}: {}", found.fraction);
         assert_eq!(found.touching, 0.0);
     }
@@ -132,8 +132,8 @@ fn rays_leave_borders_between_touching_meshes() {
         for (k, tints) in (-80..80).filter_map(|k| Some((k, tints(k)?))) {
             let from = vertices.len() as u32;
             let corner = |along: f32, across: i32, tint: f32| {
-                let place = [0.6 * along - 0.8 * across as f32, 0.8 * along + 0.6 * across as f32, 0.0];
-                MeshVertex { tint: [tint, tint, tint, 1.0], ..MeshVertex::new(place, [0.0; 2]) }
+                let position = [0.6 * along - 0.8 * across as f32, 0.8 * along + 0.6 * across as f32, 0.0];
+                MeshVertex { tint: [tint, tint, tint, 1.0], ..MeshVertex::new(position, [0.0; 2]) }
             };
             let [low, high] = [(2 * k, tints[0]), (2 * k + 2, tints[1])];
             vertices.extend(

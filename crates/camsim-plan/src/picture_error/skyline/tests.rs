@@ -206,7 +206,7 @@ fn a_coarser_crest_displaces_the_skyline() {
     assert!(lowered(1e-6) < 1e-20);
     // From 0 to 1 px and back along the crest: of squares a third, in the mean.
     let contrast2 =
-        skyline.points.iter().map(|(_, place)| place.contrast2).sum::<f64>() / skyline.points.len() as f64;
+        skyline.points.iter().map(|(_, point)| point.contrast2).sum::<f64>() / skyline.points.len() as f64;
     let fraction = 400.0 / 120_000.0;
     let expected = margins::SKYLINE_OF_TERRAIN * margins::SKYLINE_OF_TERRAIN * contrast2 * fraction / 3.0;
     assert!((0.6..1.6).contains(&(lowered(2.0) / expected)), "{} {expected}", lowered(2.0));

@@ -90,15 +90,15 @@ impl AxisAlias {
     }
 }
 
-/// A wave that is always read at the same place between ideal pixels.
+/// A wave that is always read at the same position between ideal pixels.
 pub(crate) struct PlacedWave {
     pub aliases: [[AxisAlias; 3]; 2],
-    /// Turns of each alias along x and y by that place.
+    /// Turns of each alias along x and y by that position.
     pub turned: [[Transfer; 3]; 2],
 }
 
 impl PlacedWave {
-    /// Cycles an ideal pixel, and the place beside an ideal pixel.
+    /// Cycles an ideal pixel, and the position beside an ideal pixel.
     pub fn new(f: DVec2, beside_px: DVec2) -> Self {
         let aliases = [AxisAlias::all(f.x), AxisAlias::all(f.y)];
         let turned =

@@ -51,7 +51,7 @@ pub(crate) fn read(kernel: Kernel, axis: usize, f: f64) -> f64 {
 /// One axis of a wave that looks like another on the grid of ideal pixels.
 struct ExactAlias {
     frequency: f64,
-    /// What a read leaves of it, turned as the read's place turns it.
+    /// What a read leaves of it, turned as the read's position turns it.
     read: Transfer,
 }
 

@@ -49,7 +49,7 @@ fn whole(x: Vec4) -> Vec4 {
 
 /// `sin(pi x)` of half a turn, to 3e-7 of itself.
 fn sin_pi_of_half(x: Vec4) -> Vec4 {
-    // Of x, x^3, ...: exact at five places, 7e-9 off between them; the rest is rounding.
+    // Of x, x^3, ...: exact at five positions, 7e-9 off between them; the rest is rounding.
     const SERIES: [f32; 5] = [std::f32::consts::PI, -5.167_71, 2.550_077_4, -0.598_290_4, 0.077_655_91];
     let square = x * x;
     x * SERIES.iter().rev().fold(Vec4::ZERO, |sum, &term| sum * square + term)

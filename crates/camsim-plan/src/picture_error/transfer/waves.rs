@@ -57,7 +57,7 @@ pub(crate) struct TextureWaves(Vec<TextureWave>);
 
 #[derive(Debug)]
 struct TextureWave {
-    /// Its place in the table.
+    /// Its index in the table.
     index: usize,
     /// Cycles a texel.
     cycles: DVec2,
@@ -101,7 +101,7 @@ impl TextureWaves {
     /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where
     /// the source lies between ideal pixels.
     pub fn read(&self, area: &Footprint, over: ReadSpan, beside_px: DVec2) -> Vec<Transfer> {
-        // Turns of whole cycles by the place of the read.
+        // Turns of whole cycles by the position of the read.
         let turns = |beside_px: f64| -> [Transfer; 2 * MOST_AWAY + 1] {
             std::array::from_fn(|i| turned_by((i as f64 - MOST_AWAY as f64) * beside_px))
         };

@@ -18,7 +18,7 @@ impl DryRun<'_> {
         moved(inverse(drawn_m)).distance(moved(inverse(depth_m)))
     }
 
-    /// Displacement of the terrain: how far the place of the terrain's picture that is drawn at the true
+    /// Displacement of the terrain: how far the position of the terrain's picture that is drawn at the true
     /// source is from there, ideal pixels: to first order, and no more than is allowed.
     pub fn terrain_px(&self, source: &ExactSource, detail: &TerrainDetail<'_>) -> f64 {
         let Some(SurfaceHit { depth_m, terrain: Some(hit), .. }) = source.key_hit else { return 0.0 };

@@ -51,7 +51,7 @@ impl<'a> IdealDepth<'a> {
         interpolate_inverse_depth(texels, inside - base)
     }
 
-    /// Inverse depth of what is drawn along the very ray of a place, which may lie between texels.
+    /// Inverse depth of what is drawn along the very ray of a position, which may lie between texels.
     pub fn along(&mut self, source_px: DVec2) -> f64 {
         let (origin, ray) = (self.key_pose.position_ned_m, key_ray(self.key_pose, self.ideal, source_px));
         match (self.surfaces.first_hit(origin, ray), self.detail) {

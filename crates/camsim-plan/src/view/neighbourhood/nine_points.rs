@@ -19,7 +19,7 @@ pub(super) struct NinePoints<'a> {
     pub probe: &'a Probe,
     pub mid_s: f64,
     pub pose: CameraPose,
-    places: [DVec2; 9],
+    positions: [DVec2; 9],
     hits: [Option<SurfaceHit>; 9],
     inverse_depth: [f64; 9],
 }
@@ -29,21 +29,21 @@ impl<'a> NinePoints<'a> {
         let [x, y] = probe.pixel;
         let mid_s = search.stamp_s + search.shutter.dt_pixel_s(x, y);
         let pose = search.path.pose(mid_s);
-        let places: [DVec2; 9] =
+        let positions: [DVec2; 9] =
             std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
         let mut points =
-            Self { search, probe, mid_s, pose, places, hits: [None; 9], inverse_depth: [0.0; 9] };
-        points.hits = places.map(|place| points.cast(place));
+            Self { search, probe, mid_s, pose, positions, hits: [None; 9], inverse_depth: [0.0; 9] };
+        points.hits = positions.map(|position| points.cast(position));
         points.inverse_depth = points.hits.map(|hit| hit.map_or(0.0, |hit| hit.depth_m.recip()));
         points
     }
 
-    fn uv(&self, place: DVec2) -> DVec2 {
-        self.probe.uv + self.probe.uv_from_px * (f64::from(NEAR_PX) * place)
+    fn uv(&self, position: DVec2) -> DVec2 {
+        self.probe.uv + self.probe.uv_from_px * (f64::from(NEAR_PX) * position)
     }
 
-    fn cast(&self, place: DVec2) -> Option<SurfaceHit> {
-        let ray_ned = self.pose.ned_from_camera * self.uv(place).extend(1.0);
+    fn cast(&self, position: DVec2) -> Option<SurfaceHit> {
+        let ray_ned = self.pose.ned_from_camera * self.uv(position).extend(1.0);
         self.search.surfaces.first_hit(self.pose.position_ned_m, ray_ned)
     }
 
@@ -51,8 +51,8 @@ impl<'a> NinePoints<'a> {
     pub fn steps(&self) -> Vec<Pair> {
         let step = |a: usize, b: usize| {
             let between = |fraction: f64| {
-                let place = self.places[a].lerp(self.places[b], fraction);
-                self.cast(place).map_or(0.0, |hit| hit.depth_m.recip())
+                let position = self.positions[a].lerp(self.positions[b], fraction);
+                self.cast(position).map_or(0.0, |hit| hit.depth_m.recip())
             };
             steps(self.inverse_depth[a], self.inverse_depth[b], between).then_some([a, b])
         };
@@ -96,7 +96,7 @@ impl<'a> NinePoints<'a> {
     /// Squared contrast between two points, mean over the channels.
     pub fn contrast2(&self, &[a, b]: &Pair) -> f64 {
         let color = |i: usize| {
-            let ray = self.uv(self.places[i]).extend(1.0);
+            let ray = self.uv(self.positions[i]).extend(1.0);
             let ray_ned = self.pose.ned_from_camera * ray;
             let origin = self.pose.position_ned_m;
             self.search.surfaces.light(origin, ray_ned, self.hits[i].as_ref(), ray.length()).color
@@ -107,17 +107,17 @@ impl<'a> NinePoints<'a> {
     /// Across the silhouette, towards what is nearer: along it parallax shows the same again.
     pub fn normal(&self) -> DVec2 {
         let towards = self
-            .places
+            .positions
             .iter()
             .zip(self.inverse_depth)
-            .fold(DVec2::ZERO, |sum, (place, nearness)| sum + nearness * *place);
+            .fold(DVec2::ZERO, |sum, (position, nearness)| sum + nearness * *position);
         (self.search.reach.camera.central_focal_px() * (self.probe.uv_from_px * towards)).normalize_or_zero()
     }
 
     /// Whether models may be seen among the points. Lines through the probe are for models, which may be
     /// narrower than the distance of the points; where the terrain steps, lines count how often.
     pub fn may_show_models(&self) -> bool {
-        let rays = self.places.map(|place| self.uv(place));
+        let rays = self.positions.map(|position| self.uv(position));
         let (low, high) =
             rays.iter().fold((rays[0], rays[0]), |(low, high), uv| (low.min(*uv), high.max(*uv)));
         let range_m = |(uv, hit): (&DVec2, &Option<SurfaceHit>)| {

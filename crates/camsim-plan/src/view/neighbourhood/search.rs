@@ -4,7 +4,7 @@ use camsim_core::{mount::CameraPath, shutter::Shutter};
 
 use crate::view::{lens_reach::LensReach, surfaces::Surfaces};
 
-/// Lines of three through three by three places, the border's first.
+/// Lines of three through three by three positions, the border's first.
 pub(crate) const LINES: [[usize; 3]; 8] =
     [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 

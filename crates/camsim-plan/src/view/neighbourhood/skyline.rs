@@ -19,7 +19,7 @@ use crate::view::{probes::Probe, source_path::path_px};
 const NEIGHBOURS: f64 = 1.6;
 /// Most crossings that are examined, of all that there are.
 const MOST_LOOKS: usize = 24;
-/// Halvings from probe to probe, and from one direction to the next of those around a place.
+/// Halvings from probe to probe, and from one direction to the next of those around a position.
 const HALVINGS: u32 = 8;
 const HALVINGS_AROUND: u32 = 4;
 const DIRECTIONS: u32 = 8;
@@ -114,14 +114,14 @@ impl NeighbourhoodSearch<'_> {
             }
         }
         let each = crossings.len().div_ceil(MOST_LOOKS).max(1);
-        let places: Vec<Option<SkylinePoint>> = crossings
+        let points: Vec<Option<SkylinePoint>> = crossings
             .par_iter()
             .step_by(each)
             .map(|[sky_px, surface_px]| self.point_between(*sky_px, *surface_px))
             .collect();
-        let times = crossings.len() as f64 / places.len().max(1) as f64;
+        let times = crossings.len() as f64 / points.len().max(1) as f64;
         Skyline {
-            points: places.into_iter().flatten().map(|point| (times, point)).collect(),
+            points: points.into_iter().flatten().map(|point| (times, point)).collect(),
             across_px,
             focal_px: self.reach.camera.central_focal_px(),
             reach_px: if self.surfaces.blends { 0.0 } else { SKY_REACH_PX },
@@ -158,12 +158,13 @@ impl NeighbourhoodSearch<'_> {
         })
     }
 
-    /// Across the skyline, if it passes once through a circle around one of its places as far away as pixels
+    /// Across the skyline, if it passes once through a circle around one of its positions as far away as pixels
     /// at it are.
     fn normal(&self, point_px: DVec2) -> Option<DVec2> {
-        let place = |turns: f64| point_px + f64::from(NEAR_PX) * DVec2::from_angle(TAU * turns);
+        let position = |turns: f64| point_px + f64::from(NEAR_PX) * DVec2::from_angle(TAU * turns);
         let turns = |k: u32| f64::from(k) / f64::from(DIRECTIONS);
-        let is_sky = (0..DIRECTIONS).map(|k| self.is_sky(place(turns(k)))).collect::<Option<Vec<bool>>>()?;
+        let is_sky =
+            (0..DIRECTIONS).map(|k| self.is_sky(position(turns(k)))).collect::<Option<Vec<bool>>>()?;
         let ends: Vec<u32> = (0..DIRECTIONS)
             .filter(|&k| is_sky[k as usize] != is_sky[((k + 1) % DIRECTIONS) as usize])
             .collect();
@@ -172,14 +173,14 @@ impl NeighbourhoodSearch<'_> {
             let (mut from, mut to) = (turns(k), turns(k + 1));
             for _ in 0..HALVINGS_AROUND {
                 let middle = 0.5 * (from + to);
-                *(if self.is_sky(place(middle))? == is_sky[k as usize] { &mut from } else { &mut to }) =
+                *(if self.is_sky(position(middle))? == is_sky[k as usize] { &mut from } else { &mut to }) =
                     middle;
             }
-            self.reach.camera.unproject(place(from))
+            self.reach.camera.unproject(position(from))
         };
         let uv_of_sky = {
             let sky: DVec2 =
-                (0..DIRECTIONS).filter(|&k| is_sky[k as usize]).map(|k| place(turns(k)) - point_px).sum();
+                (0..DIRECTIONS).filter(|&k| is_sky[k as usize]).map(|k| position(turns(k)) - point_px).sum();
             self.reach.camera.unproject(point_px + sky.normalize_or_zero() * f64::from(NEAR_PX))?
         };
         let across =
@@ -236,7 +237,7 @@ impl NeighbourhoodSearch<'_> {
         Some(self.surfaces.first_hit(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).is_none())
     }
 
-    /// The camera and ray of a place of the picture, and its instant.
+    /// The camera and ray of a position of the picture, and its instant.
     fn ray_at(&self, point_px: DVec2) -> Option<(CameraPose, DVec2, f64)> {
         let last = self.reach.camera.size_px.map(|side| f64::from(side - 1));
         let [x, y] = [0, 1].map(|axis: usize| point_px[axis].round().clamp(0.0, last[axis]) as u32);

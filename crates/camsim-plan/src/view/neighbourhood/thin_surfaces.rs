@@ -23,11 +23,11 @@ use glam::DVec2;
 use super::search::NeighbourhoodSearch;
 use crate::view::{light::RayLight, probes::Probe, surfaces::SurfaceHit};
 
-/// Places along each of the two lines, and how far they are apart: far houses have borders nearer to each
+/// Points along each of the two lines, and how far they are apart: far houses have borders nearer to each
 /// other than a pixel.
-const PLACES: usize = 13;
+const POINTS: usize = 13;
 const APART_PX: f64 = 1.0 / 3.0;
-/// Places from one whole pixel to the next.
+/// Points from one whole pixel to the next.
 const A_PIXEL: usize = 3;
 
 /// What two lines through a probe cross.
@@ -51,17 +51,17 @@ pub(crate) struct LineCrossings {
     pub at_pixel_spacing: f64,
 }
 
-/// From place to place a mesh has another colour, whatever is painted on it, if that changes by more than
+/// From point to point a mesh has another colour, whatever is painted on it, if that changes by more than
 /// this, linear: its corners have no colours in common, or light falls on it from another side. Colours that
 /// change gradually do so by less over a third of a pixel.
 const OTHER_TINT: f64 = 0.02;
 
-/// Whether two places that see no step of depth between them are of the terrain and of what stands on it.
+/// Whether two points that see no step of depth between them are of the terrain and of what stands on it.
 fn is_on_terrain(a: Option<&SurfaceHit>, b: Option<&SurfaceHit>) -> bool {
     a.zip(b).is_some_and(|(a, b)| (a.surface == 0) != (b.surface == 0))
 }
 
-/// Whether two places that see no step of depth between them are of different meshes, or of parts of one that
+/// Whether two points that see no step of depth between them are of different meshes, or of parts of one that
 /// have different colours.
 fn is_another(a: Option<&SurfaceHit>, b: Option<&SurfaceHit>) -> bool {
     let (Some(a), Some(b)) = (a, b) else { return false };
@@ -91,7 +91,7 @@ impl NeighbourhoodSearch<'_> {
         if count == 0 && touching2 + creases2 + on_terrain2 == 0.0 {
             return LineCrossings::default();
         }
-        let length_px = 2.0 * APART_PX * (PLACES - 1) as f64;
+        let length_px = 2.0 * APART_PX * (POINTS - 1) as f64;
         let gain2 = (self.gain)(probe.pixel).powi(2);
         let of_area = |contrast2: f64| FRAC_PI_2 * contrast2 / length_px * gain2;
         LineCrossings {
@@ -122,29 +122,29 @@ struct PointLine<'a> {
     probe: &'a Probe,
     pose: CameraPose,
     axis: DVec2,
-    hits: [Option<SurfaceHit>; PLACES],
-    inverse_depths: [f64; PLACES],
+    hits: [Option<SurfaceHit>; POINTS],
+    inverse_depths: [f64; POINTS],
     /// Both neighbours of a point need its light.
-    lights: [OnceCell<RayLight>; PLACES],
+    lights: [OnceCell<RayLight>; POINTS],
 }
 
 impl<'a> PointLine<'a> {
     fn new(search: &'a NeighbourhoodSearch<'a>, probe: &'a Probe, pose: CameraPose, axis: DVec2) -> Self {
         let lights = std::array::from_fn(|_| OnceCell::new());
-        let (hits, inverse_depths) = ([None; PLACES], [0.0; PLACES]);
+        let (hits, inverse_depths) = ([None; POINTS], [0.0; POINTS]);
         let mut line = Self { search, probe, pose, axis, hits, inverse_depths, lights };
         line.hits = std::array::from_fn(|k| line.cast(k as f64));
         line.inverse_depths = line.hits.map(|hit| hit.map_or(0.0, |hit| hit.depth_m.recip()));
         line
     }
 
-    fn uv(&self, place: f64) -> DVec2 {
+    fn uv(&self, along: f64) -> DVec2 {
         let Self { probe, axis, .. } = self;
-        probe.uv + probe.uv_from_px * (APART_PX * (place - 0.5 * (PLACES - 1) as f64) * *axis)
+        probe.uv + probe.uv_from_px * (APART_PX * (along - 0.5 * (POINTS - 1) as f64) * *axis)
     }
 
-    fn cast(&self, place: f64) -> Option<SurfaceHit> {
-        let ray_ned = self.pose.ned_from_camera * self.uv(place).extend(1.0);
+    fn cast(&self, along: f64) -> Option<SurfaceHit> {
+        let ray_ned = self.pose.ned_from_camera * self.uv(along).extend(1.0);
         self.search.surfaces.first_hit(self.pose.position_ned_m, ray_ned)
     }
 
@@ -165,12 +165,12 @@ impl<'a> PointLine<'a> {
     /// Whether it holds of the three points that begin before a pair or with it.
     fn either(&self, k: usize, holds: impl Fn([f64; 3]) -> bool) -> bool {
         let three = |k: usize| [0, 1, 2].map(|n: usize| self.inverse_depths[k + n]);
-        (k > 0 && holds(three(k - 1))) || (k + 2 < PLACES && holds(three(k)))
+        (k > 0 && holds(three(k - 1))) || (k + 2 < POINTS && holds(three(k)))
     }
 
     fn add_to(&self, sums: &mut CrossingSums) {
         let mut of_pixel = 0.0;
-        for k in 0..PLACES - 1 {
+        for k in 0..POINTS - 1 {
             let before = sums.contrast2 + sums.touching2 + sums.creases2;
             self.add_pair_to(k, sums);
             of_pixel += sums.contrast2 + sums.touching2 + sums.creases2 - before;

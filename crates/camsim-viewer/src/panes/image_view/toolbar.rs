@@ -146,5 +146,5 @@ fn overlays(ui: &mut Ui, view: &mut View) {
     ui.toggle_value(&mut over.rows, "row times").with_tooltip("mid-exposure of each row, after the stamp");
     ui.toggle_value(&mut over.error, "predicted error")
         .with_tooltip("predicted source error at the planner's probes: bright is large");
-    ui.toggle_value(&mut over.depth, "depth").with_tooltip("planar depth in place of colour: near is bright");
+    ui.toggle_value(&mut over.depth, "depth").with_tooltip("planar depth instead of colour: near is bright");
 }

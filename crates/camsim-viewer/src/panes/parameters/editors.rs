@@ -144,7 +144,7 @@ impl Editor<'_> {
         if may_be_left_out && self.value.is_some() && self.remove() { REMOVED } else { None }
     }
 
-    /// Draws a word that stands in place of a value; returns whether it was clicked.
+    /// Draws a word that stands instead of a value; returns whether it was clicked.
     fn word_button(&mut self, is_word: bool, word: &str) -> bool {
         let response = self.ui.selectable_label(is_word, word).with_tooltip(self.tip());
         named(&response, Role::Button, &format!("{}: {word}", self.key));

@@ -69,7 +69,7 @@ pub(super) struct ModelPoint<'m> {
     pub(super) id: u64,
     pub(super) position_m: DVec3,
     pub(super) rgb: [u8; 3],
-    /// Images, and places in their lists of points.
+    /// Images, and indices in their lists of points.
     pub(super) track: &'m [(u32, u32)],
 }
 
@@ -191,7 +191,7 @@ impl<'a> Model<'a> {
         (point < self.positions.len() as u64).then_some(point)
     }
 
-    /// Calls `visit` with point, image, and place in the image's list.
+    /// Calls `visit` with point, image, and index in the image's list.
     fn each_observation(&self, visit: &mut dyn FnMut(u64, u32, u32)) -> Result<(), DatasetError> {
         let mut seen = Vec::new();
         for camera in &self.cameras {
@@ -199,7 +199,7 @@ impl<'a> Model<'a> {
             for (image, frame) in (camera.first_image + 1..).zip(&camera.camera.frames) {
                 observations.of(frame.number, &mut seen)?;
                 let points = seen.iter().filter_map(|seen| self.known(camera, seen));
-                points.zip(0..).for_each(|(point, place)| visit(point, image, place));
+                points.zip(0..).for_each(|(point, index)| visit(point, image, index));
             }
         }
         Ok(())
@@ -245,9 +245,9 @@ impl<'a> Model<'a> {
         let all = of_rigs.flat_map(|(rig, moments)| moments.iter().map(move |moment| (rig, moment)));
         for (id, (rig, moment)) in (1..).zip(all) {
             images.clear();
-            images.extend(moment.pictures.iter().map(|(sensor, place)| {
+            images.extend(moment.pictures.iter().map(|(sensor, index)| {
                 let camera = &self.cameras[rig.sensors[*sensor].camera];
-                (camera.id, camera.first_image + *place as u32 + 1)
+                (camera.id, camera.first_image + *index as u32 + 1)
             }));
             let rig_from_world = rig_from_world(rig, moment, &cameras, self.format)?;
             visit(&ModelFrame { id, rig: rig.id, rig_from_world, images: &images })?;
@@ -270,9 +270,9 @@ impl<'a> Model<'a> {
             });
             let last = first + more.count().max(1);
             let mut tracks: Vec<Vec<(u32, u32)>> = vec![Vec::new(); last - first];
-            self.each_observation(&mut |point, image, place| {
+            self.each_observation(&mut |point, image, index| {
                 if (first..last).contains(&(point as usize)) {
-                    tracks[point as usize - first].push((image, place));
+                    tracks[point as usize - first].push((image, index));
                 }
             })?;
             for (point, track) in (first..).zip(&tracks).filter(|(_, track)| !track.is_empty()) {

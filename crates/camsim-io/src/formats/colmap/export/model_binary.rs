@@ -65,9 +65,9 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
             out.write_all(&point.rgb)?;
             put_f64(out, &[model.error_px()])?;
             put_u64(out, point.track.len() as u64)?;
-            point.track.iter().try_for_each(|(image, place)| {
+            point.track.iter().try_for_each(|(image, index)| {
                 put_u32(out, *image)?;
-                put_u32(out, *place)
+                put_u32(out, *index)
             })
         })
     })
@@ -77,9 +77,9 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
 fn put_rig(out: &mut dyn Write, model: &Model<'_>, rig: &ModelRig) -> Result<(), DatasetError> {
     put_u32(out, rig.id)?;
     put_u32(out, rig.sensors.len() as u32)?;
-    for (place, sensor) in rig.sensors.iter().enumerate() {
+    for (index, sensor) in rig.sensors.iter().enumerate() {
         put_sensor(out, model.cameras()[sensor.camera].id)?;
-        if place > 0 {
+        if index > 0 {
             out.write_all(&[1])?;
             put_pose(out, &sensor.sensor_from_rig)?;
         }

@@ -31,9 +31,9 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
         )?;
         model.rigs().iter().try_for_each(|rig| {
             write!(out, "{} {}", rig.id, rig.sensors.len())?;
-            for (place, sensor) in rig.sensors.iter().enumerate() {
+            for (index, sensor) in rig.sensors.iter().enumerate() {
                 write!(out, " CAMERA {}", model.cameras()[sensor.camera].id)?;
-                if place > 0 {
+                if index > 0 {
                     write!(out, " 1 {}", pose(&sensor.sensor_from_rig))?;
                 }
             }
@@ -80,7 +80,7 @@ pub(super) fn write(job: &ExportJob<'_>, model: &Model<'_>, folder: &str) -> Res
             let [r, g, b] = point.rgb;
             let position = joined(&point.position_m.to_array());
             write!(out, "{} {position} {r} {g} {b} {}", point.id, Number(model.error_px()))?;
-            point.track.iter().try_for_each(|(image, place)| write!(out, " {image} {place}"))?;
+            point.track.iter().try_for_each(|(image, index)| write!(out, " {image} {index}"))?;
             Ok(writeln!(out)?)
         })
     })

@@ -16,7 +16,7 @@ pub(super) struct ModelRig {
 
 /// A camera of a rig.
 pub(super) struct RigSensor {
-    /// Its place among the cameras of the model.
+    /// Its index among the cameras of the model.
     pub(super) camera: usize,
     pub(super) sensor_from_rig: Rigid,
 }
@@ -26,7 +26,7 @@ pub(super) struct RigSensor {
 pub(super) struct Moment {
     /// Instant of the centres.
     t_ns: i64,
-    /// Places in the rig's list of sensors, and of frames in the camera's list.
+    /// Indices in the rig's list of sensors, and of frames in the camera's list.
     pub(super) pictures: Vec<(usize, usize)>,
 }
 
@@ -76,20 +76,20 @@ pub(super) fn moments(rig: &ModelRig, cameras: &[&RunCamera]) -> Vec<Moment> {
                 .frames
                 .iter()
                 .enumerate()
-                .map(|(place, frame)| (camera.true_centre_ns(frame), sensor, place)),
+                .map(|(index, frame)| (camera.true_centre_ns(frame), sensor, index)),
         );
     }
     // Of one instant in the order of sensors, whatever the last nanosecond says.
     all.sort_unstable();
     let mut moments: Vec<Moment> = Vec::new();
-    for (t_ns, sensor, place) in all {
+    for (t_ns, sensor, index) in all {
         match moments.last_mut() {
             Some(last)
                 if t_ns - last.t_ns <= SAME_NS && last.pictures.iter().all(|(other, _)| *other != sensor) =>
             {
-                last.pictures.push((sensor, place));
+                last.pictures.push((sensor, index));
             }
-            _ => moments.push(Moment { t_ns, pictures: vec![(sensor, place)] }),
+            _ => moments.push(Moment { t_ns, pictures: vec![(sensor, index)] }),
         }
     }
     moments.iter_mut().for_each(|moment| moment.pictures.sort_unstable());
@@ -103,10 +103,10 @@ pub(super) fn rig_from_world(
     cameras: &[&RunCamera],
     format: &str,
 ) -> Result<Rigid, DatasetError> {
-    let (sensor, place) = moment.pictures[0];
+    let (sensor, index) = moment.pictures[0];
     let RigSensor { camera, sensor_from_rig } = &rig.sensors[sensor];
     let camera = cameras[*camera];
-    let world_from_sensor = enu_from_camera(&camera.centre_pose(format, &camera.frames[place])?);
+    let world_from_sensor = enu_from_camera(&camera.centre_pose(format, &camera.frames[index])?);
     if sensor == 0 {
         return Ok(world_from_sensor.inverse());
     }

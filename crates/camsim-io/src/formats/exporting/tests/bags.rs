@@ -135,7 +135,7 @@ fn messages_are_those_of_ros_by_ascending_time() {
     assert!(q.iter().zip([0.0, 0.0, half, half]).all(|(a, b)| (a - b).abs() < 1e-12), "{q:?}");
     let Transforms(fixed) = decoded(&messages["/tf_static"][0].1);
     let of: BTreeMap<&str, &[f64; 3]> =
-        fixed.iter().map(|(_, child, place, _)| (child.as_str(), place)).collect();
+        fixed.iter().map(|(_, child, offset, _)| (child.as_str(), offset)).collect();
     assert_eq!(of["imu0"], &[0.5, 0.0, -0.25]);
     assert_eq!(of["cam0"], &[0.0, 0.0, 0.0]);
 }

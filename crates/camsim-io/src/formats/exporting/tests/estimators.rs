@@ -232,9 +232,9 @@ fn a_stereo_rig_has_its_baseline() {
             let data = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
             let info = data.into_iter().find(|message| message.channel.topic == topic).unwrap().data.to_vec();
             let p = super::bags::projection(&info);
-            let place = if wanted.starts_with("P[7]") { 7 } else { 3 };
+            let index = if wanted.starts_with("P[7]") { 7 } else { 3 };
             let value: f64 = wanted[5..].parse().unwrap();
-            assert!((p[place] - value).abs() < 1e-9 && p[11] == 0.0, "{rig} {mount}: {p:?}");
+            assert!((p[index] - value).abs() < 1e-9 && p[11] == 0.0, "{rig} {mount}: {p:?}");
         }
     }
 }

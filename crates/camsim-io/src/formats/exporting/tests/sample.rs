@@ -210,7 +210,7 @@ fn write_run(folder: &Path, scenario: &Scenario, columns: &[&str]) {
             instant: None,
             stamp_ns,
             pose,
-            place: None,
+            geodetic: None,
             source,
             exposure: None,
             files,

@@ -1,4 +1,4 @@
-//! Columns of places in tables.
+//! Columns of positions in tables.
 
 use camsim_core::scenario::PatternCentre;
 
@@ -7,17 +7,17 @@ use crate::table::finite;
 /// North, east, down, metres; latitude, longitude, degrees, and height, metres.
 pub(super) const NAMES: [[&str; 3]; 2] = [["n_m", "e_m", "d_m"], ["lat_deg", "lon_deg", "height_m"]];
 
-/// Where a table has places.
+/// Where a table has positions.
 #[derive(Debug, PartialEq)]
-pub(super) struct PlaceColumns {
+pub(super) struct PositionColumns {
     pub(super) is_local: bool,
     pub(super) columns: [Option<usize>; 3],
 }
 
-/// A local place, or one on Earth.
-pub(super) type Place = (PatternCentre, Option<[f64; 3]>);
+/// A local position, or one on Earth.
+pub(super) type Position = (PatternCentre, Option<[f64; 3]>);
 
-impl PlaceColumns {
+impl PositionColumns {
     /// Finds the columns; the third may be missing with `on_ground`. `None` if there are none or two kinds of them,
     /// or if one is missing.
     pub(super) fn of(header: &csv::StringRecord, on_ground: bool) -> Option<Self> {
@@ -33,26 +33,26 @@ impl PlaceColumns {
         is_whole.then_some(Self { is_local, columns })
     }
 
-    /// The place of a row; without a column of heights that is 0.
-    pub(super) fn read(&self, row: &csv::StringRecord) -> Result<Place, String> {
-        let mut place = [0.0; 3];
-        for (value, column) in place.iter_mut().zip(self.columns) {
+    /// The position of a row; without a column of heights that is 0.
+    pub(super) fn read(&self, row: &csv::StringRecord) -> Result<Position, String> {
+        let mut position = [0.0; 3];
+        for (value, column) in position.iter_mut().zip(self.columns) {
             *value = column.map_or(Ok(0.0), |column| finite(row, column))?;
         }
-        let [lat_deg, lon_deg, _] = place;
+        let [lat_deg, lon_deg, _] = position;
         if self.is_local {
-            return Ok((PatternCentre::Ned(place), None));
+            return Ok((PatternCentre::Ned(position), None));
         }
         if lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0 {
             return Err(format!(
-                "latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are degrees, latitude -90 to 90"
+                "latitude {lat_deg}, longitude {lon_deg} are no position on Earth; both are degrees, latitude -90 to 90"
             ));
         }
-        Ok((PatternCentre::Origin, Some(place)))
+        Ok((PatternCentre::Origin, Some(position)))
     }
 }
 
-/// Refuses columns that are neither of places nor known otherwise, and those that are there twice.
+/// Refuses columns that are neither of positions nor known otherwise, and those that are there twice.
 pub(super) fn check_names(
     header: &csv::StringRecord,
     is_known: impl Fn(&str) -> bool,
