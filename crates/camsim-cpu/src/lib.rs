@@ -26,5 +26,5 @@ mod simd;
 
 pub use cast::{Instant, MovingCaster, RayScratch};
 pub use general::RowTable;
-pub use renderer::{CpuRenderer, IdealBuffer, ReverseInputs};
+pub use renderer::{BufferHandle, CpuRenderer, ReverseInputs};
 pub use reverse::{IdealTexels, suits_processor};

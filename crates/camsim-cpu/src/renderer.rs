@@ -28,7 +28,7 @@ const BUFFERS: usize = 2;
 
 /// Handle of ideal frames that the renderer holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct IdealBuffer(usize);
+pub struct BufferHandle(usize);
 
 /// Renders frames of one sequence.
 #[derive(Debug)]
@@ -47,13 +47,13 @@ pub struct CpuRenderer {
     vignette: Vec<f32>,
     /// Lens map of each face and colour, and the bits of its zoom value.
     lens_maps: HashMap<(Option<Face>, Option<Primary>), (u64, LensMap)>,
-    buffers: [Ideal; BUFFERS + Face::ALL.len()],
+    buffers: [KeyFrames; BUFFERS + Face::ALL.len()],
     last: usize,
 }
 
 /// The ideal frames of one output frame.
 #[derive(Debug, Default)]
-struct Ideal {
+struct KeyFrames {
     size_px: [u32; 2],
     /// The rasterised key frame.
     drawn: RasterFrame,
@@ -111,7 +111,7 @@ impl CpuRenderer {
         plan: &FramePlan,
         terrain: Option<&PlacedMesh>,
         tolerance: &LodTolerance,
-    ) -> IdealBuffer {
+    ) -> BufferHandle {
         // The frame in flight may still read the other buffer.
         let buffer = match plan.camera.lens.face() {
             Some(face) => BUFFERS + face as usize,
@@ -128,7 +128,7 @@ impl CpuRenderer {
         if self.general_only || !(self.rasterises && is_plain) {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
-            return IdealBuffer(buffer);
+            return BufferHandle(buffer);
         }
         let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
         let view = DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance };
@@ -137,13 +137,13 @@ impl CpuRenderer {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             cast.add_shadows(plan, key, &mut ideal.drawn);
         }
-        IdealBuffer(buffer)
+        BufferHandle(buffer)
     }
 
     /// The first ideal frame of a buffer: linear R G B A (with the paper preset sRGB-encoded values) and
     /// inverse depth, 1/m, row-major.
     #[must_use]
-    pub fn ideal_images(&self, IdealBuffer(buffer): IdealBuffer) -> (Vec<f32>, Vec<f32>) {
+    pub fn ideal_images(&self, BufferHandle(buffer): BufferHandle) -> (Vec<f32>, Vec<f32>) {
         let ideal = &self.buffers[buffer];
         match ideal.cast.first() {
             Some(image) => (image.color_rgba.clone(), image.inverse_depth.clone()),
@@ -156,7 +156,7 @@ impl CpuRenderer {
     pub fn reverse(
         &mut self,
         inputs: &ReverseInputs<'_>,
-        IdealBuffer(buffer): IdealBuffer,
+        BufferHandle(buffer): BufferHandle,
     ) -> (Vec<f32>, Option<Vec<Truth>>) {
         let plan = inputs.plan;
         self.fit_lens_map(plan);

@@ -8,7 +8,7 @@ use camsim_core::{
     scene::{LodSelection, LodTolerance},
     temporal::IdealGeometry,
 };
-use camsim_cpu::IdealBuffer;
+use camsim_cpu::BufferHandle;
 use camsim_plan::{EdgeStage, FramePlan, PrefilterTaps, Renderer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -24,12 +24,12 @@ pub(crate) struct Lane {
     pub moving: Option<MovingScene>,
     pub lamps: Option<Lamps>,
     pub missed: Missed,
-    pub ideal: Option<IdealCache>,
+    pub ideal: Option<CachedFrames>,
 }
 
 /// All inputs of the ideal frames of an output frame. Equal inputs give equal ideal frames.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct IdealKey {
+pub(crate) struct CacheKey {
     pub poses: Vec<CameraPose>,
     pub ideal: IdealGeometry,
     pub edges: EdgeStage,
@@ -42,11 +42,11 @@ pub(crate) struct IdealKey {
 
 /// The last ideal frames, reused by frames with the same key.
 #[derive(Debug)]
-pub(crate) struct IdealCache {
-    pub key: IdealKey,
+pub(crate) struct CachedFrames {
+    pub key: CacheKey,
     pub lod: LodSelection,
     /// Buffer of the cpu renderer, if it drew them.
-    pub buffer: Option<IdealBuffer>,
+    pub buffer: Option<BufferHandle>,
 }
 
 /// Turns what a face's frame says in the face's axes to those of the whole camera: planar depth, normals.

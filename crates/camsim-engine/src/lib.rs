@@ -41,7 +41,7 @@ pub mod verify;
 pub use camsim_gpu::GpuContext;
 pub use camsim_plan::{
     Backend,
-    adapter::{AdapterChoice, AdapterSummary, GpuError, IdealImages},
+    adapter::{AdapterChoice, AdapterSummary, GpuError, IdealPlanes},
 };
 pub use engine::{Engine, adapters};
 pub use error::RenderError;

@@ -10,11 +10,11 @@ use camsim_core::{
     scene::{LodSelection, SceneBatches},
     sequence::Sequence,
 };
-use camsim_cpu::{CpuRenderer, IdealBuffer, IdealTexels, ReverseInputs};
+use camsim_cpu::{BufferHandle, CpuRenderer, IdealTexels, ReverseInputs};
 use camsim_plan::{
     FramePlan, PixelHit, PlanError, Planner, Renderer,
     adapter::{
-        AdapterSession, CopiedIdeal, FRAMES_IN_FLIGHT, GpuError, GpuJob, IdealCopy, IdealImages, Readback,
+        AdapterSession, CopiedIdeal, CopyHandle, FRAMES_IN_FLIGHT, GpuError, GpuJob, IdealPlanes, Readback,
         Submitted,
     },
     uniforms::{FrameUniforms, Truth, frame_uniforms},
@@ -24,7 +24,7 @@ use crate::{
     Engine, Finished, FrameTimes, RenderError,
     error::RenderErrorBase,
     finished,
-    lane::{IdealCache, IdealKey, Lane, add_part, joined, turn_to_camera_axes},
+    lane::{CacheKey, CachedFrames, Lane, add_part, joined, turn_to_camera_axes},
     moving::{Lamps, MovingScene},
     planner_threads,
     prepare_ahead::{Job, PrepareAhead, Prepared, Preparer, ms_since},
@@ -53,13 +53,13 @@ pub struct Session<'a> {
 
 /// Location of the ideal frame of a frame in flight.
 #[derive(Debug)]
-enum IdealSource {
+enum FrameLocation {
     /// On the gpu, which renders the output frame too.
     Gpu(Submitted),
     /// On the gpu, which copies it to memory for the cpu renderer.
-    Copied(Submitted, IdealCopy),
+    Copied(Submitted, CopyHandle),
     /// In a buffer of the cpu renderer.
-    Cpu(IdealBuffer),
+    Cpu(BufferHandle),
 }
 
 /// A submitted frame of a lane.
@@ -68,7 +68,7 @@ struct InFlight {
     job: Job,
     prepared: Prepared,
     uniforms: FrameUniforms,
-    source: IdealSource,
+    source: FrameLocation,
     lod: LodSelection,
     times: FrameTimes,
 }
@@ -262,7 +262,7 @@ impl<'a> Session<'a> {
         let lane = &mut self.lanes[job.lane];
         let sequence = planner.sequence().clone();
         let uniforms = frame_uniforms(plan, &sequence, self.coords_phase);
-        let key = IdealKey {
+        let key = CacheKey {
             poses: plan.key_poses(),
             ideal: plan.ideal,
             edges: plan.edges,
@@ -278,7 +278,7 @@ impl<'a> Session<'a> {
         let mut times = FrameTimes { plan_ms: prepared.plan_ms, ..FrameTimes::default() };
         if redraws {
             let lod = prepared.meshes.get(plan.keys.len() / 2).map(|mesh| mesh.lod).unwrap_or_default();
-            lane.ideal = Some(IdealCache { key: key.clone(), lod, buffer: None });
+            lane.ideal = Some(CachedFrames { key: key.clone(), lod, buffer: None });
             if key.renderer == Renderer::Cpu {
                 let begin = Instant::now();
                 let terrain = prepared.meshes.first();
@@ -289,7 +289,7 @@ impl<'a> Session<'a> {
         }
         let (lod, buffer) = lane.ideal.as_ref().map(|ideal| (ideal.lod, ideal.buffer)).unwrap_or_default();
         let source = match (buffer, &mut self.gpu) {
-            (Some(buffer), _) => IdealSource::Cpu(buffer),
+            (Some(buffer), _) => FrameLocation::Cpu(buffer),
             (None, Some(gpu)) => {
                 let makes_output = plan.placement.reverse == Renderer::Gpu;
                 let inputs = GpuJob {
@@ -307,13 +307,13 @@ impl<'a> Session<'a> {
                 times.record_ms = submitted.record_ms;
                 times.submit_ms = submitted.submit_ms;
                 match submitted.copy.filter(|_| !makes_output) {
-                    Some(copy) => IdealSource::Copied(submitted, copy),
-                    None => IdealSource::Gpu(submitted),
+                    Some(copy) => FrameLocation::Copied(submitted, copy),
+                    None => FrameLocation::Gpu(submitted),
                 }
             }
             (None, None) => return Err(GpuError::NoAdapter(String::new()).into()),
         };
-        if matches!(source, IdealSource::Gpu(_) | IdealSource::Copied(..)) {
+        if matches!(source, FrameLocation::Gpu(_) | FrameLocation::Copied(..)) {
             // The gpu holds the ideal frames that it drew last only.
             for other in (0..self.lanes.len()).filter(|&other| other != job.lane) {
                 self.lanes[other].ideal.take_if(|ideal| ideal.buffer.is_none());
@@ -328,7 +328,7 @@ impl<'a> Session<'a> {
         let InFlight { job, prepared: Prepared { plan, rows, .. }, uniforms, source, lod, mut times } = done;
         let inputs = ReverseInputs { plan: &plan, uniforms: &uniforms, rows: &rows };
         let begin = Instant::now();
-        if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
+        if let (Some(gpu), FrameLocation::Gpu(submitted) | FrameLocation::Copied(submitted, _)) =
             (&self.gpu, &source)
         {
             gpu.wait(submitted)?;
@@ -336,8 +336,8 @@ impl<'a> Session<'a> {
         }
         let begin = Instant::now();
         let (color_rgba, truth) = match (&source, &self.gpu) {
-            (IdealSource::Cpu(buffer), _) => self.cpu.reverse(&inputs, *buffer),
-            (IdealSource::Copied(_, copy), Some(gpu)) => {
+            (FrameLocation::Cpu(buffer), _) => self.cpu.reverse(&inputs, *buffer),
+            (FrameLocation::Copied(_, copy), Some(gpu)) => {
                 let mut made = None;
                 gpu.with_copy(*copy, &mut |ideal| {
                     let CopiedIdeal { color, color_stride, depth, depth_stride } = ideal;
@@ -346,19 +346,19 @@ impl<'a> Session<'a> {
                 })?;
                 made.ok_or_else(|| GpuError::Device("a copied ideal frame of a plan without poses".into()))?
             }
-            (IdealSource::Gpu(submitted), Some(gpu)) => gpu.output(submitted)?,
+            (FrameLocation::Gpu(submitted), Some(gpu)) => gpu.output(submitted)?,
             (_, None) => return Err(GpuError::NoAdapter(String::new()).into()),
         };
         let elapsed_ms = ms_since(begin);
         match source {
-            IdealSource::Gpu(_) => times.read_ms = elapsed_ms,
-            IdealSource::Cpu(_) | IdealSource::Copied(..) => times.reverse_ms = Some(elapsed_ms),
+            FrameLocation::Gpu(_) => times.read_ms = elapsed_ms,
+            FrameLocation::Cpu(_) | FrameLocation::Copied(..) => times.reverse_ms = Some(elapsed_ms),
         }
         let begin = Instant::now();
         let frame = self.with_truth(job.lane, &plan, color_rgba, truth)?;
         times.read_ms += ms_since(begin);
         let mut out_of_order = 0;
-        if let (Some(gpu), IdealSource::Gpu(submitted) | IdealSource::Copied(submitted, _)) =
+        if let (Some(gpu), FrameLocation::Gpu(submitted) | FrameLocation::Copied(submitted, _)) =
             (&self.gpu, &source)
         {
             times.passes = gpu.pass_times(submitted)?;
@@ -456,8 +456,8 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Faults of the adapter.
-    pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
-        let Some(IdealCache { key, buffer, .. }) = &self.lanes[0].ideal else { return Ok(None) };
+    pub fn read_ideal(&self) -> Result<Option<IdealPlanes>, GpuError> {
+        let Some(CachedFrames { key, buffer, .. }) = &self.lanes[0].ideal else { return Ok(None) };
         match (buffer, &self.gpu) {
             (Some(buffer), _) => {
                 let (color, inverse_depth) = self.cpu.ideal_images(*buffer);

@@ -9,7 +9,7 @@ use camsim_core::{
     scene::{Encoding, Scene, Terrain, Texture},
     sequence::Sequence,
 };
-use camsim_engine::IdealImages;
+use camsim_engine::IdealPlanes;
 use camsim_plan::Backend;
 use camsim_plan::PrefilterTaps;
 use common::{engine, is_software, scenario, sequence, steady};
@@ -56,7 +56,7 @@ fn ideal_frames(
     sequence: &Arc<Sequence>,
     limit_px: Option<u32>,
     frames: &[u64],
-) -> (Vec<IdealImages>, PrefilterTaps, Option<[usize; 2]>) {
+) -> (Vec<IdealPlanes>, PrefilterTaps, Option<[usize; 2]>) {
     let mut engine = engine();
     // Only the gpu has tiles.
     engine.set_backend(Backend::Gpu);

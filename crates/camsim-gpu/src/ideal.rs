@@ -41,7 +41,7 @@ pub use supersampled_target::{FINE_SAMPLES, SupersampledTarget};
 use surface_pipelines::{SurfaceKey, SurfacePipelines};
 #[cfg(test)]
 pub(crate) use surface_pipelines::{mesh_slots, terrain_slots};
-pub use target::IdealTarget;
+pub use target::RenderTarget;
 use triangles_near_edges::EdgeTrianglesPass;
 
 /// Colour format of the ideal frame.
@@ -68,7 +68,7 @@ pub use camsim_plan::uniforms::key_rows;
 
 /// Pipelines that draw ideal frames.
 #[derive(Debug)]
-pub struct IdealPass {
+pub struct DrawPass {
     /// Compiled when a silhouette is first in view.
     silhouettes: Option<SilhouettePasses>,
     /// Compiled when pixels first have several samples.
@@ -95,7 +95,7 @@ struct SilhouettePasses {
 
 /// Buffers and bind groups of one ideal frame of a frame in flight.
 #[derive(Debug)]
-pub struct IdealSlot {
+pub struct DrawSlot {
     camera: wgpu::Buffer,
     /// `None` without a terrain.
     terrain: Option<TerrainSlot>,
@@ -109,7 +109,7 @@ pub struct IdealSlot {
     blended: Option<BlendedTriangles>,
 }
 
-impl IdealSlot {
+impl DrawSlot {
     /// Arguments of the indirect draw of the terrain triangles near edges; the first is the number of
     /// indices.
     pub(crate) fn edge_triangles_arguments(&self) -> Option<&wgpu::Buffer> {
@@ -117,7 +117,7 @@ impl IdealSlot {
     }
 }
 
-impl IdealPass {
+impl DrawPass {
     /// Creates the layouts; pipelines are compiled when needed.
     ///
     /// # Errors
@@ -168,7 +168,7 @@ impl IdealPass {
 
     /// Creates the buffers for one ideal frame of this scene, whose textures have been uploaded.
     #[must_use]
-    pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> IdealSlot {
+    pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> DrawSlot {
         let create = |label, size: u64, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -205,7 +205,7 @@ impl IdealPass {
         let blended =
             buffers.batches.iter().any(|batch| batch.kind.blends).then(|| BlendedTriangles::new(gpu));
         let placement_group = group(&self.placement_layout, &[entry(0, placements.as_entire_binding())]);
-        IdealSlot {
+        DrawSlot {
             camera,
             terrain,
             placements,
@@ -226,13 +226,13 @@ impl IdealPass {
         &mut self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        slots: &mut [IdealSlot],
+        slots: &mut [DrawSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
         meshes: &[PlacedMesh],
         tolerance: &LodTolerance,
-        target: &IdealTarget,
+        target: &RenderTarget,
     ) -> Result<u32, GpuError> {
         let (base_key, supersampled_key) = self.compile(gpu, buffers, plan, target)?;
         let (index_counts, out_of_order) =
@@ -267,7 +267,7 @@ impl IdealPass {
         gpu: &GpuContext,
         buffers: &SceneBuffers,
         plan: &FramePlan,
-        target: &IdealTarget,
+        target: &RenderTarget,
     ) -> Result<(SurfaceKey, Option<SurfaceKey>), ComposeError> {
         let base_key = if target.multisampled.is_some() {
             SurfaceKey::Multisampled(plan.surface_reads)
@@ -299,7 +299,7 @@ impl IdealPass {
         &self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        slots: &mut [IdealSlot],
+        slots: &mut [DrawSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
@@ -337,12 +337,12 @@ impl IdealPass {
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
         key: SurfaceKey,
-        slots: &[IdealSlot],
+        slots: &[DrawSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
         index_counts: &[u32],
-        target: &IdealTarget,
+        target: &RenderTarget,
     ) {
         let (Some(supersampled), Some(passes), EdgeStage::Supersampled { thin, .. }) =
             (&target.supersampled, &self.silhouettes, plan.edges)
@@ -380,7 +380,7 @@ impl IdealPass {
         plan: &FramePlan,
         scale: u32,
         buffers: &SceneBuffers,
-        slots: &[IdealSlot],
+        slots: &[DrawSlot],
         triangles: impl Fn(usize) -> TriangleSelection,
     ) {
         let Some(pipelines) = self.pipelines.get(&key) else { return };

@@ -12,11 +12,11 @@ use camsim_plan::{EdgeStage, FramePlan, RayStage};
 
 use crate::{
     adapter::{
-        AdapterSession, CopiedIdeal, FRAMES_IN_FLIGHT, GpuError, GpuJob, IdealCopy, IdealImages, PassTime,
+        AdapterSession, CopiedIdeal, CopyHandle, FRAMES_IN_FLIGHT, GpuError, GpuJob, IdealPlanes, PassTime,
         Readback, Submitted,
     },
     context::GpuContext,
-    ideal::{IdealPass, IdealTarget},
+    ideal::{DrawPass, RenderTarget},
     layout::Truth,
     recorder::{PassClock, Recorder},
     reverse::{
@@ -35,7 +35,7 @@ mod readback;
 mod tables;
 
 use frame_slot::{FrameSlot, SessionTarget, group_of, list_buffer, pose_buffer};
-use ideal_copies::IdealCopies;
+use ideal_copies::FrameCopies;
 
 /// Maximum number of cached ideal targets.
 const MAX_TARGETS: usize = 4;
@@ -50,7 +50,7 @@ struct LastIdeal {
     /// Slot of the frame for which they were drawn.
     slot: usize,
     out_of_order: u32,
-    copy: Option<IdealCopy>,
+    copy: Option<CopyHandle>,
 }
 
 /// One sequence on the GPU.
@@ -58,7 +58,7 @@ struct LastIdeal {
 pub struct GpuSession<'a> {
     gpu: &'a GpuContext,
     buffers: SceneBuffers,
-    ideal_pass: IdealPass,
+    ideal_pass: DrawPass,
     reverse_pass: ReversePass,
     lens_pass: Option<LensInversePass>,
     /// Current lens map of each face and colour, and the bits of its zoom value.
@@ -67,7 +67,7 @@ pub struct GpuSession<'a> {
     zoom_maps: HashMap<usize, LensMap>,
     targets: Vec<SessionTarget>,
     last_ideal: Option<LastIdeal>,
-    copies: IdealCopies,
+    copies: FrameCopies,
     frame_slots: Vec<FrameSlot>,
     /// Pixel lists of the frame that is being recorded, for frames with silhouettes.
     lists: Option<[wgpu::Buffer; 2]>,
@@ -90,7 +90,7 @@ impl<'a> GpuSession<'a> {
         let scene = &sequence.scene;
         let buffers = SceneBuffers::new(gpu, scene, meshes)?;
         let preset = sequence.scenario.quality.preset;
-        let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some(), scene.fog_visibility_m)?;
+        let ideal_pass = DrawPass::new(gpu, preset, buffers.tiles().is_some(), scene.fog_visibility_m)?;
         let session = Self {
             vignette: tables::vignette(gpu, sequence),
             noise_table: tables::noise_table(gpu),
@@ -101,7 +101,7 @@ impl<'a> GpuSession<'a> {
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
             last_ideal: None,
-            copies: IdealCopies::new(gpu),
+            copies: FrameCopies::new(gpu),
             frame_slots: frame_slots(gpu, sequence, truth),
             lists: None,
             buffers,
@@ -189,7 +189,7 @@ impl AdapterSession for GpuSession<'_> {
         Ok((slot.color.read()?, truth))
     }
 
-    fn with_copy(&self, copy: IdealCopy, read: &mut dyn FnMut(CopiedIdeal<'_>)) -> Result<(), GpuError> {
+    fn with_copy(&self, copy: CopyHandle, read: &mut dyn FnMut(CopiedIdeal<'_>)) -> Result<(), GpuError> {
         self.copies.read(copy, read)
     }
 
@@ -200,7 +200,7 @@ impl AdapterSession for GpuSession<'_> {
         }
     }
 
-    fn read_ideal(&self, ideal: &IdealGeometry) -> Result<Option<IdealImages>, GpuError> {
+    fn read_ideal(&self, ideal: &IdealGeometry) -> Result<Option<IdealPlanes>, GpuError> {
         self.ideal_images(ideal)
     }
 
@@ -315,7 +315,7 @@ impl GpuSession<'_> {
     /// Target for the ideal frames of a plan. It becomes the last of all; the least recently used one of its
     /// kind is dropped if there are too many.
     fn target(&mut self, plan: &FramePlan) -> usize {
-        let size_px = IdealTarget::size_for(plan, self.gpu.max_side_px());
+        let size_px = RenderTarget::size_for(plan, self.gpu.max_side_px());
         let face = plan.camera.lens.face();
         let serves = |target: &SessionTarget| target.face == face && target.ideal.serves(size_px, plan);
         let cached = self.targets.iter().position(serves);
@@ -330,7 +330,7 @@ impl GpuSession<'_> {
             }
             SessionTarget {
                 face,
-                ideal: IdealTarget::new(self.gpu, size_px, plan),
+                ideal: RenderTarget::new(self.gpu, size_px, plan),
                 groups: Default::default(),
             }
         });

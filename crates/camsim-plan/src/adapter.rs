@@ -86,7 +86,7 @@ pub trait AdapterSession: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// Faults of the device.
-    fn with_copy(&self, copy: IdealCopy, read: &mut dyn FnMut(CopiedIdeal<'_>)) -> Result<(), GpuError>;
+    fn with_copy(&self, copy: CopyHandle, read: &mut dyn FnMut(CopiedIdeal<'_>)) -> Result<(), GpuError>;
 
     /// Duration of each pass of a frame, if time stamps are enabled.
     ///
@@ -100,7 +100,7 @@ pub trait AdapterSession: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// Device faults; `None` before the first frame.
-    fn read_ideal(&self, ideal: &IdealGeometry) -> Result<Option<IdealImages>, GpuError>;
+    fn read_ideal(&self, ideal: &IdealGeometry) -> Result<Option<IdealPlanes>, GpuError>;
 
     /// Number of terrain triangles near edge pixels, which were drawn with several samples per pixel, in the
     /// frame for which the ideal frame was last drawn (the first of several). Meaningful only if
@@ -168,7 +168,7 @@ pub struct Submitted {
     /// Whether it has depth and coordinates.
     pub truth: bool,
     /// The copy of the ideal frame, if it is read back.
-    pub copy: Option<IdealCopy>,
+    pub copy: Option<CopyHandle>,
     /// Blended triangles that are drawn before something behind them, over all ideal frames.
     pub out_of_order: u32,
     /// Duration of the recording, ms.
@@ -179,7 +179,7 @@ pub struct Submitted {
 
 /// Handle of a copy of an ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct IdealCopy(pub usize);
+pub struct CopyHandle(pub usize);
 
 /// An ideal frame in memory.
 #[derive(Clone, Copy, Debug)]
@@ -195,7 +195,7 @@ pub struct CopiedIdeal<'a> {
 }
 
 /// Geometry, linear R G B A (A is 0 at edge pixels), and inverse depth in 1/m of an ideal frame, row-major.
-pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);
+pub type IdealPlanes = (IdealGeometry, Vec<f32>, Vec<f32>);
 
 /// Duration of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]

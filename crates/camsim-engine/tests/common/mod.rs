@@ -9,7 +9,7 @@ pub mod rays;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{scenario::Channel, sequence::Sequence};
-use camsim_engine::{AdapterChoice, Engine, Finished, IdealImages};
+use camsim_engine::{AdapterChoice, Engine, Finished, IdealPlanes};
 
 pub use fixtures::*;
 
@@ -51,7 +51,7 @@ pub fn render(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], f
 }
 
 /// Frame 0 with coordinates of the given phase, and the ideal frame that it was gathered from.
-pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, IdealImages) {
+pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, IdealPlanes) {
     let engine = engine();
     let mut session =
         engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");

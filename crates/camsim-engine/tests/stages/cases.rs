@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::{
     common::{barrel_lens, ground_and_roof, pattern, rolling, scenario, sequence, steady},
     compare::Done,
-    ideal_twin::IdealTwin,
+    ideal_twin::TwinSource,
     implementations::ALL_CHANNELS,
     stage::OtherSurface,
 };
@@ -57,7 +57,7 @@ pub struct Case {
     pub coords_phase: f32,
     /// The sequence without photometric effects.
     pub plain: Option<Arc<Sequence>>,
-    pub ideal_twin: IdealTwin,
+    pub ideal_twin: TwinSource,
     pub other_surface: OtherSurface,
 }
 
@@ -70,7 +70,7 @@ impl Case {
             output,
             coords_phase: 0.0,
             plain: None,
-            ideal_twin: IdealTwin::None,
+            ideal_twin: TwinSource::None,
             other_surface: OtherSurface { dn: f64::INFINITY, depth: f64::INFINITY },
         }
     }

@@ -19,7 +19,7 @@ use super::{
         fixtures::gallery::{self, key, opaque_scene, planned},
         pattern, scenario, sequence, steady,
     },
-    ideal_twin::IdealTwin,
+    ideal_twin::TwinSource,
     planned_cases::SIZE_PX,
     stage::OtherSurface,
 };
@@ -145,7 +145,7 @@ pub fn patterns() -> Vec<Case> {
         ("fine", with(camera(-60.0), scale(3.1)), 120.0, 400.0),
     ];
     let case = |(name, scenario, height_m, width_m)| Case {
-        ideal_twin: IdealTwin::Pattern { width_m },
+        ideal_twin: TwinSource::Pattern { width_m },
         ..Case::new(name, from_height(scenario, height_m, pattern(width_m)), Input::Frame(2), Output::Ideal)
     };
     all.map(case).into()
@@ -242,7 +242,7 @@ pub fn gallery() -> Vec<Case> {
         let plan = FramePlan { keys: vec![key], ..plan.clone() };
         let input = Input::Plan(Box::new(plan));
         Case {
-            ideal_twin: IdealTwin::Rays,
+            ideal_twin: TwinSource::Rays,
             ..Case::new(format!("gallery, view {number}"), sequence.clone(), input, Output::Ideal)
         }
     };

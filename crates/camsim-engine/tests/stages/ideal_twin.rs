@@ -1,7 +1,7 @@
 //! The ideal frame in closed form or by rays in f64.
 
 use camsim_core::reference::Oracle;
-use camsim_engine::IdealImages;
+use camsim_engine::IdealPlanes;
 use camsim_plan::FramePlan;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ const PIXELS_A_MEAN: usize = 3;
 
 /// Where the values of the ideal frame come from.
 #[derive(Clone, Copy, Debug)]
-pub enum IdealTwin {
+pub enum TwinSource {
     /// Nowhere: it is compared with those of other implementations only.
     None,
     /// The formula of [`super::common::pattern`] of such a width on level ground: depth of the centre, mean
@@ -29,7 +29,7 @@ pub enum IdealTwin {
 pub fn ideal_twin(
     case: &Case,
     plan: &FramePlan,
-    (geometry, color_rgba, inverse_depth): &IdealImages,
+    (geometry, color_rgba, inverse_depth): &IdealPlanes,
 ) -> IdealOutput {
     let pose = &plan.keys[0].pose;
     let count = inverse_depth.len();
@@ -40,8 +40,8 @@ pub fn ideal_twin(
     };
     let ray = |i: usize, offset_px: DVec2| pose.ned_from_camera * uv(i, offset_px).extend(1.0);
     let values: Vec<(Option<f64>, Option<DVec3>)> = match case.ideal_twin {
-        IdealTwin::None => vec![(None, None); count],
-        IdealTwin::Rays => {
+        TwinSource::None => vec![(None, None); count],
+        TwinSource::Rays => {
             let oracle = Oracle::new(case.sequence.clone()).expect("a usable camera");
             let value = |i: usize| {
                 let hit = oracle.cast(pose.position_ned_m, ray(i, DVec2::ZERO));
@@ -50,7 +50,7 @@ pub fn ideal_twin(
             };
             (0..count).into_par_iter().map(value).collect()
         }
-        IdealTwin::Pattern { width_m } => {
+        TwinSource::Pattern { width_m } => {
             let offset = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
             let value = |i: usize| {
                 if inverse_depth[i] <= 0.0 || !i.is_multiple_of(PIXELS_A_MEAN) {

@@ -11,7 +11,7 @@ use camsim_core::{
     sequence::Sequence,
 };
 use camsim_cpu::{CpuRenderer, ReverseInputs, RowTable};
-use camsim_engine::{Engine, Finished, IdealImages};
+use camsim_engine::{Engine, Finished, IdealPlanes};
 use camsim_plan::{
     Backend, FramePlan,
     placement::{cpu_rasterises, cpu_vectorises},
@@ -47,7 +47,7 @@ impl Implementation {
 pub struct CaseOutput {
     pub plan: FramePlan,
     /// The ideal frame as the output frame was read from it.
-    pub images: IdealImages,
+    pub images: IdealPlanes,
     pub lod: LodSelection,
     pub frame: FrameOutput,
 }
@@ -264,7 +264,7 @@ fn finest_terrain(sequence: &Sequence, plan: &FramePlan) -> Option<PlacedMesh> {
 }
 
 /// An ideal frame as it is compared.
-pub fn ideal_output((geometry, color_rgba, inverse_depth): &IdealImages) -> IdealOutput {
+pub fn ideal_output((geometry, color_rgba, inverse_depth): &IdealPlanes) -> IdealOutput {
     let pixels = color_rgba.as_chunks::<4>().0;
     IdealOutput {
         geometry: *geometry,

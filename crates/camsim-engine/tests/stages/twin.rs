@@ -13,7 +13,7 @@ use camsim_core::{
     },
 };
 use camsim_cpu::RowTable;
-use camsim_engine::IdealImages;
+use camsim_engine::IdealPlanes;
 use camsim_plan::{FramePlan, RayStage, TemporalStage, table_shape};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ impl<'a> Twin<'a> {
     pub fn new(
         case: &'a Case,
         plan: &'a FramePlan,
-        (ideal, color_rgba, inverse_depth): &'a IdealImages,
+        (ideal, color_rgba, inverse_depth): &'a IdealPlanes,
         oracle: &'a Oracle,
     ) -> Self {
         assert_eq!(plan.keys.len(), 1, "{}: one ideal frame", case.name);

@@ -11,7 +11,7 @@ use camsim_core::{
 };
 use glam::{DMat3, DVec2, DVec3};
 
-use super::{IdealSlot, draw_surfaces::index_buffer, surface_pipelines::SurfacePipelines};
+use super::{DrawSlot, draw_surfaces::index_buffer, surface_pipelines::SurfacePipelines};
 use crate::{adapter::GpuError, context::GpuContext, recorder::Recorder, upload::SceneBuffers};
 
 const FEWER_TRIANGLES: &str =
@@ -125,7 +125,7 @@ impl BlendedTriangles {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &SurfacePipelines,
-        slot: &IdealSlot,
+        slot: &DrawSlot,
         buffers: &SceneBuffers,
     ) {
         let mut last = None;

@@ -7,7 +7,7 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use super::{IdealSlot, surface_pipelines::SurfacePipelines, triangles_near_edges::SelectedTriangles};
+use super::{DrawSlot, surface_pipelines::SurfacePipelines, triangles_near_edges::SelectedTriangles};
 use crate::{
     adapter::GpuError,
     context::GpuContext,
@@ -24,7 +24,7 @@ const MIN_BYTES: u64 = 1 << 16;
 /// detail. Returns the mesh of each placement.
 pub(super) fn upload_placements(
     recorder: &mut Recorder<'_>,
-    slot: &mut IdealSlot,
+    slot: &mut DrawSlot,
     buffers: &SceneBuffers,
     pose: &CameraPose,
     tolerance: &LodTolerance,
@@ -49,7 +49,7 @@ pub(super) fn upload_placements(
 pub(super) fn draw_meshes(
     pass: &mut wgpu::RenderPass<'_>,
     pipelines: &SurfacePipelines,
-    slot: &IdealSlot,
+    slot: &DrawSlot,
     buffers: &SceneBuffers,
     blended: bool,
 ) {
@@ -190,7 +190,7 @@ pub(super) enum TriangleSelection {
 pub(super) fn draw_terrain(
     pass: &mut wgpu::RenderPass<'_>,
     pipelines: &SurfacePipelines,
-    slot: &IdealSlot,
+    slot: &DrawSlot,
     triangles: TriangleSelection,
 ) {
     let Some(terrain) = slot.terrain.as_ref() else { return };

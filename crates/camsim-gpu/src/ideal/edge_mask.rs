@@ -3,7 +3,7 @@
 use camsim_plan::{FramePlan, SIZE_QUANTUM_PX};
 
 use super::{
-    COLOR_FORMAT, IdealTarget, key_rows,
+    COLOR_FORMAT, RenderTarget, key_rows,
     supersampled_target::{SupersampledTarget, TILE_PX, full_view},
 };
 use crate::{
@@ -125,7 +125,7 @@ impl EdgeMaskPass {
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
         plan: &FramePlan,
-        target: &IdealTarget,
+        target: &RenderTarget,
         fine: &SupersampledTarget,
         thin: bool,
     ) {
@@ -153,7 +153,7 @@ impl EdgeMaskPass {
         &self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        target: &IdealTarget,
+        target: &RenderTarget,
         fine: &SupersampledTarget,
     ) {
         let groups = fine.edge_mask_groups.get_or_init(|| self.bind(gpu, target, fine));
@@ -175,7 +175,7 @@ impl EdgeMaskPass {
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
         plan: &FramePlan,
-        target: &IdealTarget,
+        target: &RenderTarget,
         fine: &SupersampledTarget,
     ) {
         let [across, down] = target.allocated_px.map(|side| side.div_ceil(TILE_PX));
@@ -193,7 +193,7 @@ impl EdgeMaskPass {
         }
     }
 
-    fn bind(&self, gpu: &GpuContext, target: &IdealTarget, fine: &SupersampledTarget) -> EdgeMaskGroups {
+    fn bind(&self, gpu: &GpuContext, target: &RenderTarget, fine: &SupersampledTarget) -> EdgeMaskGroups {
         let bind = |layout: &wgpu::BindGroupLayout, resources: &[wgpu::BindingResource<'_>]| {
             let entries: Vec<_> = (0..)
                 .zip(resources)

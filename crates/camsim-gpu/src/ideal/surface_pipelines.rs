@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use camsim_plan::PrefilterTaps;
 
 use super::{
-    COLOR_FORMAT, FINE_SAMPLES, IdealPass,
+    COLOR_FORMAT, DrawPass, FINE_SAMPLES,
     draw_state::{DrawState, WriteMode, pipeline},
 };
 use crate::{
@@ -84,7 +84,7 @@ pub(super) struct SurfacePipelines {
     pub blended: HashMap<MeshKind, wgpu::RenderPipeline>,
 }
 
-impl IdealPass {
+impl DrawPass {
     pub(super) fn surface_pipelines(
         &self,
         gpu: &GpuContext,

@@ -11,7 +11,7 @@ use crate::context::GpuContext;
 
 /// Textures of the ideal frames of an output frame.
 #[derive(Debug)]
-pub struct IdealTarget {
+pub struct RenderTarget {
     /// Allocated width and height, pixels.
     pub allocated_px: [u32; 2],
     /// Linear colour.
@@ -31,7 +31,7 @@ pub struct IdealTarget {
     pub gather_depth: wgpu::TextureView,
 }
 
-impl IdealTarget {
+impl RenderTarget {
     /// Allocated size for the ideal frames of a plan, one below the other. It is rounded up, so that a few
     /// allocations serve all frames, and depends on the frame alone.
     #[must_use]

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use camsim_plan::FramePlan;
 
-use super::{IdealSlot, key_rows, supersampled_target::SupersampledTarget};
+use super::{DrawSlot, key_rows, supersampled_target::SupersampledTarget};
 use crate::{
     context::GpuContext,
     layout::KeyLayout,
@@ -119,7 +119,7 @@ impl EdgeTrianglesPass {
         recorder: &mut Recorder<'_>,
         plan: &FramePlan,
         tiles_across: u32,
-        slots: &[IdealSlot],
+        slots: &[DrawSlot],
         index_counts: &[u32],
         fine: &SupersampledTarget,
     ) {

@@ -9,7 +9,7 @@ use super::readback::ReadbackBuffer;
 use crate::{
     adapter::FRAMES_IN_FLIGHT,
     context::GpuContext,
-    ideal::{IdealSlot, IdealTarget},
+    ideal::{DrawSlot, RenderTarget},
     layout::{FrameUniforms, Truth},
     recorder::PassClock,
     reverse::{ReverseBindGroups, list_size},
@@ -24,7 +24,7 @@ const COLORS: usize = Primary::ALL.len();
 pub(super) struct SessionTarget {
     /// The face whose lens map the bind groups have.
     pub face: Option<Face>,
-    pub ideal: IdealTarget,
+    pub ideal: RenderTarget,
     /// Those of each colour that has a lens map of its own, one colour after the other.
     pub groups: [ReverseBindGroups; COLORS * FRAMES_IN_FLIGHT],
 }
@@ -47,7 +47,7 @@ pub(super) struct FrameSlot {
     /// Staging memory for the frame's uploads; created with the first frame.
     pub staging: Option<Staging>,
     /// One per ideal frame, as many as any frame has needed so far.
-    pub ideal: Vec<IdealSlot>,
+    pub ideal: Vec<DrawSlot>,
     pub frame: wgpu::Buffer,
     pub poses: wgpu::Buffer,
     pub color: ReadbackBuffer,

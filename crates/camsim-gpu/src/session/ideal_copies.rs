@@ -4,9 +4,9 @@ use camsim_core::temporal::IdealGeometry;
 
 use super::readback::TextureReadback;
 use crate::{
-    adapter::{CopiedIdeal, GpuError, IdealCopy},
+    adapter::{CopiedIdeal, CopyHandle, GpuError},
     context::GpuContext,
-    ideal::IdealTarget,
+    ideal::RenderTarget,
     recorder::Recorder,
 };
 
@@ -24,14 +24,14 @@ struct CopyBuffers {
 
 /// Copies, mapped from their submission until they are reused.
 #[derive(Debug)]
-pub(super) struct IdealCopies {
+pub(super) struct FrameCopies {
     copies: [CopyBuffers; COPY_COUNT],
     last: usize,
     /// Index of the copy that the current commands write.
     recorded: Option<usize>,
 }
 
-impl IdealCopies {
+impl FrameCopies {
     pub fn new(gpu: &GpuContext) -> Self {
         let copies = [(); COPY_COUNT].map(|()| CopyBuffers {
             color: TextureReadback::empty(gpu, "camsim.ideal_color"),
@@ -50,9 +50,9 @@ impl IdealCopies {
         &mut self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        target: &IdealTarget,
+        target: &RenderTarget,
         ideal: &IdealGeometry,
-    ) -> IdealCopy {
+    ) -> CopyHandle {
         // The frame in flight may still read the other copy.
         self.last = (self.last + 1) % COPY_COUNT;
         let copy = &mut self.copies[self.last];
@@ -66,7 +66,7 @@ impl IdealCopies {
             rows.copy(recorder.encoder(), texture);
         }
         self.recorded = Some(self.last);
-        IdealCopy(self.last)
+        CopyHandle(self.last)
     }
 
     /// Requests the mapping of the copy in the submitted commands.
@@ -79,7 +79,7 @@ impl IdealCopies {
 
     pub fn read(
         &self,
-        IdealCopy(copy): IdealCopy,
+        CopyHandle(copy): CopyHandle,
         read: &mut dyn FnMut(CopiedIdeal<'_>),
     ) -> Result<(), GpuError> {
         let copy = &self.copies[copy];

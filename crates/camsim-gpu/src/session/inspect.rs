@@ -7,12 +7,12 @@ use super::{
     readback::{read_buffer, read_texture},
 };
 use crate::{
-    adapter::{GpuError, IdealImages},
+    adapter::{GpuError, IdealPlanes},
     ideal::SRGB_FORMAT,
 };
 
 impl GpuSession<'_> {
-    pub(super) fn ideal_images(&self, ideal: &IdealGeometry) -> Result<Option<IdealImages>, GpuError> {
+    pub(super) fn ideal_images(&self, ideal: &IdealGeometry) -> Result<Option<IdealPlanes>, GpuError> {
         let Some(last_ideal) = &self.last_ideal else { return Ok(None) };
         let near_m = camsim_plan::NEAR_M as f32;
         let target = &self.targets[last_ideal.target].ideal;

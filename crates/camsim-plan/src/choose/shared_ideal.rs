@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use crate::{ir::sampling_plan::SamplingPlan, view::ideal_extent::IdealExtent};
+use crate::{ir::sampling_plan::SamplingPlan, view::ideal_extent::TangentBounds};
 
 /// The ideal frame of several output frames.
 #[derive(Debug)]
 pub(crate) struct SharedIdeal {
     pub frames: Range<u64>,
     pub key_s: f64,
-    pub extent: IdealExtent,
+    pub extent: TangentBounds,
 }
 
 impl SharedIdeal {

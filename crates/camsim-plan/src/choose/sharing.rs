@@ -31,7 +31,7 @@ use crate::{
         sampling_plan::SamplingPlan,
     },
     view::{
-        ideal_extent::{IdealExtent, ideal_extent},
+        ideal_extent::{TangentBounds, ideal_extent},
         lens_reach::LensReach,
     },
 };
@@ -185,7 +185,7 @@ impl Sharing<'_> {
             let shutter = inputs.shutter_of(frame);
             ideal_extent(reach, path, &shutter, inputs.stamp_s(frame), key_s, &keys, surfaces, None)
         };
-        let extent = frames.clone().map(extent).reduce(IdealExtent::and)?;
+        let extent = frames.clone().map(extent).reduce(TangentBounds::and)?;
         let scale = own.ideal.scale(&own.camera);
         let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
         let times = area(extent.pixels(&reach.camera, scale).size_px) / area(own.ideal.size_px);

@@ -26,7 +26,7 @@ use crate::{
         surfaces::{SurfaceHit, Surfaces},
     },
 };
-use ideal_depth::{IdealDepth, key_ray};
+use ideal_depth::{DepthLookUps, key_ray};
 
 /// Most depth look-ups that are tried.
 pub(crate) const MAX_LOOK_UPS: usize = 8;
@@ -292,7 +292,7 @@ impl DryRun<'_> {
         uv: DVec2,
         (rotation, shift): (DMat3, DVec3),
         guess: Option<f64>,
-        depth: &mut IdealDepth<'_>,
+        depth: &mut DepthLookUps<'_>,
     ) -> [DVec2; MAX_LOOK_UPS + 1] {
         let direction = rotation * uv.extend(1.0);
         let mut w = match guess {
@@ -316,8 +316,8 @@ impl DryRun<'_> {
         key_ray(self.key_pose, self.ideal, source_px)
     }
 
-    fn ideal_depth<'b>(&'b self, detail: Option<&'b TerrainDetail<'b>>) -> IdealDepth<'b> {
-        IdealDepth::new(self.surfaces, self.key_pose, self.ideal, detail)
+    fn ideal_depth<'b>(&'b self, detail: Option<&'b TerrainDetail<'b>>) -> DepthLookUps<'b> {
+        DepthLookUps::new(self.surfaces, self.key_pose, self.ideal, detail)
     }
 }
 

@@ -18,12 +18,12 @@ use crate::ir::{
 
 /// Directions that an ideal frame holds, tangents in its own camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct IdealExtent {
+pub(crate) struct TangentBounds {
     low: DVec2,
     high: DVec2,
 }
 
-impl IdealExtent {
+impl TangentBounds {
     /// All of both.
     pub fn and(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
@@ -62,14 +62,15 @@ pub(crate) fn ideal_extent(
     keys: &[KeyFrame],
     surfaces: &Surfaces,
     constant_twist: Option<(TemporalStage, Twist)>,
-) -> IdealExtent {
+) -> TangentBounds {
     let key = path.pose(key_s);
     let (first, last) = shutter.window_s();
     let travel_m = travel_m(path, [stamp_s + first, stamp_s + last], key_s);
     let slant = reach.slant();
     let tangents = still_tangents(reach, slant);
     let inverse_near = 1.0 / surfaces.nearest_m(&key, tangents, travel_m);
-    let mut extent = IdealExtent { low: DVec2::splat(f64::INFINITY), high: DVec2::splat(f64::NEG_INFINITY) };
+    let mut extent =
+        TangentBounds { low: DVec2::splat(f64::INFINITY), high: DVec2::splat(f64::NEG_INFINITY) };
     let last_row = reach.camera.size_px[1] - 1;
     // The grid of the reach steps over rows of one parity: a neighbour stands for the other field.
     let in_fields = reach.rays.iter().flat_map(|&(uv, [x, y])| {
@@ -79,7 +80,7 @@ pub(crate) fn ideal_extent(
     for (uv, [x, y]) in in_fields {
         let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
         let exposure_s = shutter.exposure_pixel_s(x, y);
-        let mut include = |tangent: DVec2| extent = extent.and(IdealExtent { low: tangent, high: tangent });
+        let mut include = |tangent: DVec2| extent = extent.and(TangentBounds { low: tangent, high: tangent });
         for phase in [-0.5, 0.0, 0.5] {
             let t_s = mid_s + phase * exposure_s;
             let pose = path.pose(t_s);

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use crate::view::surfaces::{SurfaceHit, Surfaces};
 
 /// Depth of the ideal frame, found where it is asked for.
-pub(crate) struct IdealDepth<'a> {
+pub(crate) struct DepthLookUps<'a> {
     surfaces: &'a Surfaces,
     key_pose: &'a CameraPose,
     ideal: &'a IdealGeometry,
@@ -26,7 +26,7 @@ pub(crate) fn key_ray(key_pose: &CameraPose, ideal: &IdealGeometry, source_px: D
     key_pose.ned_from_camera * ((source_px - ideal.principal_px) / ideal.focal_px).extend(1.0)
 }
 
-impl<'a> IdealDepth<'a> {
+impl<'a> DepthLookUps<'a> {
     pub fn new(
         surfaces: &'a Surfaces,
         key_pose: &'a CameraPose,
