@@ -47,12 +47,12 @@ def by_area(at, side, count):
 
 
 def row(width, samples, borders, rng):
-    ways = {f"{n} reads": lambda at, count, n=n: by_grid(at, width, n, count) for n in (2, 3)}
+    methods = {f"{n} reads": lambda at, count, n=n: by_grid(at, width, n, count) for n in (2, 3)}
     for less in LESS:
         side = np.sqrt(max(width**2 - less, 1))
-        ways[f"c = {less:g}"] = lambda at, count, side=side: by_area(at, side, count)
+        methods[f"c = {less:g}"] = lambda at, count, side=side: by_area(at, side, count)
     reach = 2 * (0.75 * width + 1)
-    squares = dict.fromkeys(ways, 0.0)
+    squares = dict.fromkeys(methods, 0.0)
     count = int(np.ceil(width + 5))
     for _ in range(borders):
         angle = rng.random() * 2 * np.pi
@@ -64,7 +64,7 @@ def row(width, samples, borders, rng):
         x, y = first[0] + np.arange(count), first[1] + np.arange(count)
         shown = sum((normal[0] * (x[None] + dx) + normal[1] * (y[:, None] + dy) > border).astype(float) for dx, dy in samples) / len(samples)
         exact = covered(at, normal, border, width)
-        for name, weights in ways.items():
+        for name, weights in methods.items():
             found = weights(at[1] - first[1], count) @ shown @ weights(at[0] - first[0], count)
             squares[name] += (found - exact) ** 2 * reach / width
     return {name: np.sqrt(square / borders) for name, square in squares.items()}
@@ -76,7 +76,7 @@ def main():
     for name, samples in (("four samples", FOUR), ("one sample", ONE)):
         print(name)
         for width in WIDTHS:
-            print(f"  w = {width}: " + ", ".join(f"{way} {rms:.4f}" for way, rms in row(width, samples, borders, rng).items()), flush=True)
+            print(f"  w = {width}: " + ", ".join(f"{method} {rms:.4f}" for method, rms in row(width, samples, borders, rng).items()), flush=True)
 
 
 main()

@@ -56,16 +56,16 @@ for name, coefficients in LENSES.items():
     lens = camsim.Lens((640, 480), (420.0, 421.0), (318.3, 241.2), model=model, coefficients=coefficients)
     pixels = np.random.default_rng(1).uniform([0.0, 0.0], [639.0, 479.0], (POINTS, 2))
     k = np.array(coefficients) if coefficients else np.zeros(4)
-    ways = {"camsim": lambda: lens.undistort(pixels)}
-    ways |= {end: by_opencv(model, pixels, lens.matrix, k, criteria) for end, criteria in ENDS.items()}
-    times = {way: [] for way in ways}
+    methods = {"camsim": lambda: lens.undistort(pixels)}
+    methods |= {end: by_opencv(model, pixels, lens.matrix, k, criteria) for end, criteria in ENDS.items()}
+    times = {method: [] for method in methods}
     made = {}
     for _ in range(TURNS):
-        for way, work in ways.items():
-            ms, made[way] = timed_ms(work)
-            times[way].append(ms)
+        for method, work in methods.items():
+            ms, made[method] = timed_ms(work)
+            times[method].append(ms)
     own_ms = min(times["camsim"])
-    off = {way: off_px(model, ideal, pixels, lens.matrix, k) for way, ideal in made.items()}
+    off = {method: off_px(model, ideal, pixels, lens.matrix, k) for method, ideal in made.items()}
     line = f"{name:24} {own_ms:7.1f} {off['camsim']:9.1e}"
     for end in ENDS:
         cv_ms = min(times[end])

@@ -1,5 +1,5 @@
 //! `CAMSIM_SKIP_GPU=1` makes the tests that need an adapter show as ignored, never as passed.
-#![allow(clippy::print_stdout)] // the way a build script speaks to cargo
+#![allow(clippy::print_stdout)] // how a build script speaks to cargo
 
 fn main() {
     println!("cargo::rerun-if-env-changed=CAMSIM_SKIP_GPU");

@@ -49,7 +49,7 @@ class PoseTable:
     """Attitudes, scalar first, from body axes (forward, right, down); shape (N, 4)."""
     angles_deg: ArrayLike | None = None
     """Instead of them: roll, pitch, yaw, degrees; shape (N, 3). Without attitudes set
-    `flight.attitude = "track"`: the nose looks along the way."""
+    `flight.attitude = "track"`: the nose looks along the path."""
 
     def __post_init__(self) -> None:
         if self.position_ned_m is None and self.geodetic is None:

@@ -118,7 +118,7 @@ picture += rock[..., None] * (stone.astype(np.float32) - picture)
 
 # --- the works of people, on the valley floors --------------------------------------------------------------------------------
 def route(points, block=2, climb=14.0):
-    """Cheapest way through (col, row) points, climbing dearly and keeping off the streams."""
+    """Cheapest path through (col, row) points, climbing dearly and keeping off the streams."""
     low = z[::block, ::block]
     rows, cols = low.shape
     index = np.arange(rows * cols).reshape(rows, cols)

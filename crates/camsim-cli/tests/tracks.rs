@@ -94,7 +94,7 @@ fn smoothed(picture: &image::GrayImage) -> image::GrayImage {
 /// Half the side of the window of [`refined`], pixels.
 const WINDOW_PX: i32 = 6;
 
-/// The corner near `from_px`, by the gradients of the picture: each is at right angles to the way from the corner
+/// The corner near `from_px`, by the gradients of the picture: each is at right angles to the line from the corner
 /// to where it is, so that the sum of g g^T (q - p) over a window is 0 for the corner q.
 fn refined(picture: &image::GrayImage, from_px: [f64; 2]) -> Option<[f64; 2]> {
     let mut q = from_px;

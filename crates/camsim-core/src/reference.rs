@@ -276,8 +276,8 @@ impl Oracle {
     /// blended layer in front of it, composited by alpha.
     #[must_use]
     pub fn radiance_at(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> DVec3 {
-        let way = uv.extend(1.0);
-        self.radiance_along(t_s, pose.position_ned_m, pose.ned_from_camera * way, way.length())
+        let ray = uv.extend(1.0);
+        self.radiance_along(t_s, pose.position_ned_m, pose.ned_from_camera * ray, ray.length())
     }
 
     /// As [`Oracle::is_occluded_at`] at path time 0, for scenes in which nothing moves.

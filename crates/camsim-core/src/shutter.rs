@@ -246,7 +246,7 @@ impl Shutter {
     }
 
     /// Rows or columns of the readout between which the image's centre is, or, of an interlaced image, rows of the
-    /// later field, with the fraction of the way from the first to the second.
+    /// later field, with the fraction of the distance from the first to the second.
     pub fn centre_lines(&self) -> (u32, u32, f64) {
         let last = self.lines() - 1;
         let has_fields = self.row_axis() == RowAxis::Rows && self.interlace_s > 0.0 && last > 0;

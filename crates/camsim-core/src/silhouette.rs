@@ -28,7 +28,7 @@ pub fn bends([a, b, c]: [f64; 3], fraction: f64) -> bool {
 }
 
 /// Whether there is a step between two rays with the given inverse depths (0 for the sky). `between` returns
-/// the inverse depth of the ray at a fraction of the way.
+/// the inverse depth of the ray at a fraction of the path.
 pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
     let differ = |a: f64, b: f64| (a - b).abs() > STEP * a.max(b);
     let (mut before, mut after) = ((0.0, from), (1.0, to));

@@ -1,4 +1,4 @@
-//! Flows against those of the reference renderer, against each other, and as the way to warp a picture.
+//! Flows against those of the reference renderer, against each other, and as the means to warp a picture.
 
 mod common;
 

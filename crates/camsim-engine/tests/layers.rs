@@ -144,7 +144,7 @@ fn blending_with_light_fog_and_emission() {
     let found = pictures(&seen_from_above(lit, DVec3::ZERO));
     found.expect_in_the_middle("lit", over(up * RED + own, 0.4, up * WALL), 100.0);
     let foggy = Scene { meshes, fog_visibility_m: Some(200.0), ..Scene::default() };
-    let air = |color: DVec3, way_m: f64| SKY + (-3.912 * way_m / 200.0_f64).exp() * (color - SKY);
+    let air = |color: DVec3, path_m: f64| SKY + (-3.912 * path_m / 200.0_f64).exp() * (color - SKY);
     let found = pictures(&seen_from_above(foggy, DVec3::ZERO));
     found.expect_in_the_middle("fog", air(over(RED + own, 0.4, air(WALL, 40.0)), 60.0), 100.0);
 }

@@ -1,4 +1,4 @@
-//! Two independent ways to a rolling-shutter frame over terrain: rays of the reference renderer, and one gpu
+//! Two independent methods for a rolling-shutter frame over terrain: rays of the reference renderer, and one gpu
 //! frame per row with a global shutter at the instant of that row.
 
 mod common;

@@ -366,21 +366,21 @@ fn single_pixel_frame_is_rendered() {
         .chain(forced);
     for size_px in [[1, 1], [1, 2], [2, 1], [3, 1]] {
         let mut listed = 0;
-        let ways = [Silhouettes::Auto, Silhouettes::Rays];
+        let methods = [Silhouettes::Auto, Silhouettes::Rays];
         let cases = cases
             .clone()
             .flat_map(|case| [(case, 0.0), (case, 10.0)])
-            .flat_map(|case| ways.map(|way| (case, way)));
-        for (((solver, (velocity, rate)), exposure_ms), way) in cases {
+            .flat_map(|case| methods.map(|method| (case, method)));
+        for (((solver, (velocity, rate)), exposure_ms), method) in cases {
             let mut scenario = tiny(size_px, exposure_ms, solver);
-            scenario.quality.silhouettes = way;
+            scenario.quality.silhouettes = method;
             let sequence = sequence(scenario, steady(120.0, 0.0, velocity, rate), black_ground_and_roof());
             let done = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
             let alpha: Vec<f32> = done.frame.color_rgba().chunks_exact(4).map(|pixel| pixel[3]).collect();
             assert_eq!(
                 alpha,
                 vec![1.0; (size_px[0] * size_px[1]) as usize],
-                "{size_px:?} {exposure_ms} ms {solver:?} {way:?} {velocity} {rate}"
+                "{size_px:?} {exposure_ms} ms {solver:?} {method:?} {velocity} {rate}"
             );
             listed += u32::from(done.plan.edges != EdgeStage::None);
         }

@@ -158,8 +158,12 @@ fn sky_coordinates_are_exact_beside_surfaces() {
             assert!(off_px < 0.01, "{backend:?}, {exposure_ms} ms, ({x}, {y}): {off_px} px");
             // Instead of a point the ray's direction at its row's own mid-exposure, of length 1.
             let pose = sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y));
-            let way = DVec3::new(f64::from(of_pixel[5]), f64::from(of_pixel[6]), f64::from(of_pixel[7]));
-            assert!((way - pose.ned_from_camera * uv.extend(1.0).normalize()).length() < 1e-6, "{way}");
+            let direction =
+                DVec3::new(f64::from(of_pixel[5]), f64::from(of_pixel[6]), f64::from(of_pixel[7]));
+            assert!(
+                (direction - pose.ned_from_camera * uv.extend(1.0).normalize()).length() < 1e-6,
+                "{direction}"
+            );
             let theirs = exact_coords[i as usize];
             assert!(
                 exact_depth_m[i as usize] > 0.0

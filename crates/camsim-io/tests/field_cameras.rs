@@ -575,7 +575,7 @@ fn keys_that_a_format_defines_are_read_or_refused() {
 }
 
 #[test]
-fn messages_name_the_thing_and_a_way() {
+fn messages_name_the_thing_and_a_remedy() {
     use LensModel::Equirectangular;
     const ZED: &str = "31-ini-as-yaml/C13_zed.conf";
     const PIX4D: &str = "31-ini-as-yaml/C30_pix4d.cam";

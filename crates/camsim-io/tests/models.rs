@@ -124,7 +124,7 @@ fn models_move_along_paths_and_tables() {
     let path = "gltf = [{ file = \"model.gltf\", heading_deg = 90, motion = { path = [[1, 2, 3], [1, 22, 3]], \
                 speed_m_s = 4, start_s = 1 } }]";
     let mesh = &load(folder.path(), LOCAL, path).unwrap()[0];
-    // Its way is east and its front 90 degrees to the right of that: south, so that its left is east.
+    // Its path leads east and its front 90 degrees to the right of that: south, so that its left is east.
     for (t_s, east_m) in [(0.0, 2.5), (1.0, 2.5), (2.5, 8.5), (99.0, 22.5)] {
         assert!(left(mesh, t_s).distance(DVec3::new(1.0, east_m, 3.0)) < 1e-9, "{t_s}: {}", left(mesh, t_s));
     }

@@ -150,7 +150,7 @@ impl FramePlan {
 }
 
 impl FramePlan {
-    /// The way from the pose of the ideal frame, which is another than that within the frame where several frames
+    /// The path from the pose of the ideal frame, which is another than that within the frame where several frames
     /// share one.
     fn write_departure(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Motion { travel_m, rotation_rad, parallax_px, rotation_px, .. } = self.motion;

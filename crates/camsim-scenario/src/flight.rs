@@ -147,7 +147,7 @@ pub enum AngleKind {
     /// `wrapped`, unless a column leaves both [-180, 180] and [0, 360).
     #[default]
     Auto,
-    /// Rotation by the shorter way between two rows.
+    /// Rotation along the shorter arc between two rows.
     Wrapped,
     /// As written, turns count: from 0 to 360 is a full turn.
     Continuous,

@@ -176,7 +176,7 @@ impl Meter {
     /// where it has none.
     fn sides(&self, hit: &Hit, all: &[Option<Seen>], i: usize) -> Option<DMat2> {
         let (column, row) = (i % COLUMNS, i / COLUMNS);
-        let way = |k: usize| {
+        let difference = |k: usize| {
             let other = all[k].as_ref()?.hit.as_ref()?;
             let is_near = other.surface == hit.surface
                 && (hit.surface == 0 || other.normal_ned.dot(hit.normal_ned) > SAME_FACE);
@@ -184,8 +184,8 @@ impl Meter {
             is_near.then(|| (uv, self.points[k].position_px - self.points[i].position_px))
         };
         let after = |step: usize, index: usize, count: usize| {
-            let next = (index + 1 < count).then(|| way(i + step)).flatten();
-            next.or_else(|| (index > 0).then(|| way(i - step)).flatten())
+            let next = (index + 1 < count).then(|| difference(i + step)).flatten();
+            next.or_else(|| (index > 0).then(|| difference(i - step)).flatten())
         };
         let ((uv_along, px_along), (uv_down, px_down)) =
             after(1, column, COLUMNS).zip(after(COLUMNS, row, ROWS))?;

@@ -14,7 +14,7 @@ pub fn body_from_euler_deg([roll, pitch, yaw]: [f64; 3]) -> DQuat {
 /// Attitude relative to the row's own tangent frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Attitude {
-    /// A rotation, interpolated by the shorter way.
+    /// A rotation, interpolated along the shorter arc.
     Rotation(DQuat),
     /// Roll, pitch, yaw in degrees as written, counting turns.
     Turns([f64; 3]),

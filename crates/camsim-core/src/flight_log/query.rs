@@ -107,7 +107,7 @@ fn between(a: &LogRow, b: &LogRow, fraction: f64) -> (DVec3, DQuat) {
     (a.position_ned_m.lerp(b.position_ned_m, fraction), slerp(a.ned_from_body, b.ned_from_body, fraction))
 }
 
-/// Slerp by the shorter way at any fraction, also outside of 0..1.
+/// Slerp along the shorter arc at any fraction, also outside of 0..1.
 fn slerp(a: DQuat, b: DQuat, fraction: f64) -> DQuat {
     let relative = a.inverse() * b;
     let relative = if relative.w < 0.0 { -relative } else { relative };

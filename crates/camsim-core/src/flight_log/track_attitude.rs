@@ -77,7 +77,7 @@ pub(super) fn fill(rows: &mut [LogRow], frame: Option<&LocalFrame>) {
 }
 
 /// Heading of each row. Rows without a direction keep the heading before them, and turn into the next one, by
-/// the shorter way, within [`TURN_S`] before it. All zero for a log that stands still.
+/// the shorter arc, within [`TURN_S`] before it. All zero for a log that stands still.
 fn headings_rad(rows: &[LogRow], motions: &[Motion]) -> Vec<f64> {
     let mut known: Vec<(usize, f64)> = Vec::new();
     for (i, Motion { velocity, is_sure, .. }) in motions.iter().enumerate() {

@@ -380,7 +380,7 @@ fn reach(images: &[DVec2], centre: DVec2) -> Vec<f64> {
         if !far.is_finite() {
             return vec![f64::INFINITY; SECTORS];
         }
-        // Every sector between the two, by the shorter way, and one more on each side.
+        // Every sector between the two, along the shorter arc, and one more on each side.
         let (from, to) = (sector(here), sector(next));
         let forward = (to + SECTORS - from) % SECTORS;
         let (first, count) = if forward <= SECTORS / 2 { (from, forward) } else { (to, SECTORS - forward) };

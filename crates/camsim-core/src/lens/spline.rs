@@ -72,7 +72,7 @@ impl Spline {
     }
 }
 
-/// Weights of four neighbouring coefficients and their derivatives, at a fraction of the way from the second to the
+/// Weights of four neighbouring coefficients and their derivatives, at a fraction of the interval from the second to the
 /// third.
 fn weights(t: f64) -> ([f64; 4], [f64; 4]) {
     let (t2, s) = (t * t, 1.0 - t);

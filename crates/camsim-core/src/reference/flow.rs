@@ -136,7 +136,7 @@ impl Oracle {
 
 impl Goal<'_> {
     /// From the camera, in NED, at path time `t_s`.
-    fn way_from(&self, pose: &CameraPose, t_s: f64) -> DVec3 {
+    fn direction_from(&self, pose: &CameraPose, t_s: f64) -> DVec3 {
         match self {
             Self::Sky(direction) => *direction,
             Self::Point(point, None) => *point - pose.position_ned_m,
@@ -151,7 +151,7 @@ impl Goal<'_> {
 impl FrameLens<'_> {
     /// Pixel at which a camera shows a goal.
     fn show(&self, pose: &CameraPose, t_s: f64, goal: Goal<'_>) -> Option<DVec2> {
-        let ray = pose.ned_from_camera.inverse() * goal.way_from(pose, t_s);
+        let ray = pose.ned_from_camera.inverse() * goal.direction_from(pose, t_s);
         match self {
             _ if ray.z.is_nan() || ray.z <= 0.0 => None,
             Self::Fixed(lens) => lens.image(ray.truncate() / ray.z),
@@ -184,8 +184,8 @@ impl FlowPicture<'_> {
 
     /// Whether something is in front of a goal where the picture shows it.
     fn is_hidden(&self, goal: Goal<'_>, sighting: &Sighting) -> bool {
-        let way = goal.way_from(&sighting.pose, sighting.t_s);
-        let hit = self.oracle.cast_at(sighting.t_s, sighting.pose.position_ned_m, way);
+        let direction = goal.direction_from(&sighting.pose, sighting.t_s);
+        let hit = self.oracle.cast_at(sighting.t_s, sighting.pose.position_ned_m, direction);
         // The parameter is 1 at the goal; the sky is infinitely far away.
         hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6)
     }

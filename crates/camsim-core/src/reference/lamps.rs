@@ -10,7 +10,7 @@ use crate::scene::Mesh;
 const PARTS: u32 = 64;
 /// Lamps with a larger radius, pixels, are met by the first samples.
 const SMALL_PX: f64 = 12.0;
-/// Factor on the distance of a pixel's corners and on a lamp's way between two instants: both are bent.
+/// Factor on the distance of a pixel's corners and on a lamp's path between two instants: both are bent.
 const ROOM: f64 = 1.2;
 /// Pixels that are tested together first.
 const BLOCK: u32 = 16;
@@ -22,7 +22,7 @@ struct Seen {
     /// Its radius over its distance.
     radius: f64,
     /// How far it goes until the next instant or comes from the one before, in the same unit.
-    way: f64,
+    travel: f64,
 }
 
 /// The lamps that a row may see during its exposure.
@@ -94,7 +94,7 @@ impl<'a> RowLamps<'a> {
 }
 
 fn is_within(seen: &Seen, ray: DVec3, reach: f64) -> bool {
-    seen.direction.distance(ray) <= reach + seen.radius + seen.way
+    seen.direction.distance(ray) <= reach + seen.radius + seen.travel
 }
 
 /// A lamp at instants of path time, seconds.
@@ -110,14 +110,14 @@ fn of_lamp(view: &FrameView<'_>, mesh: &Mesh, instants_s: &[f64]) -> Vec<Seen> {
             Seen {
                 direction: position_m.normalize_or_zero(),
                 radius: radius_m / position_m.length(),
-                way: 0.0,
+                travel: 0.0,
             }
         })
         .collect();
     for k in 1..seen.len() {
-        let way = ROOM * 0.5 * seen[k].direction.distance(seen[k - 1].direction);
-        seen[k].way = way;
-        seen[k - 1].way = seen[k - 1].way.max(way);
+        let travel = ROOM * 0.5 * seen[k].direction.distance(seen[k - 1].direction);
+        seen[k].travel = travel;
+        seen[k - 1].travel = seen[k - 1].travel.max(travel);
     }
     seen
 }

@@ -385,9 +385,9 @@ impl FrameJob<'_> {
         let source_px = self.options.key.map_or(DVec2::ZERO, |key| key.source_px(sample));
         let dt_s = self.oracle.timing.dt_s(pixel);
         // A sample of the sky has no point; its direction is stored.
-        let way =
+        let point =
             sample.hit.map_or_else(|| sky_direction_ned(&sample.pose, sample.uv), |hit| hit.point_ned_m);
-        [sample.uv.x, sample.uv.y, source_px.x, source_px.y, dt_s, way.x, way.y, way.z]
+        [sample.uv.x, sample.uv.y, source_px.x, source_px.y, dt_s, point.x, point.y, point.z]
             .map(|value| value as f32)
     }
 }

@@ -18,12 +18,12 @@ pub(super) struct Field {
     pub poses: Vec<CameraPose>,
     /// The camera half a row before the first and behind the last row.
     beyond: [CameraPose; 2],
-    ways: Ways,
+    travel: Travel,
 }
 
 /// How far the camera turns and moves: what bounds the movement of its picture.
 #[derive(Debug, Default)]
-struct Ways {
+struct Travel {
     /// From the first node to each, radians and metres.
     turned: Vec<f64>,
     moved_m: Vec<f64>,
@@ -60,12 +60,19 @@ impl Field {
         path: &CameraPath,
     ) -> Self {
         let poses: Vec<CameraPose> = times_s.iter().map(|&t_s| path.pose(t_s)).collect();
-        let mut field =
-            Self { first_px, step_px, parity, beyond: [poses[0]; 2], times_s, poses, ways: Ways::default() };
+        let mut field = Self {
+            first_px,
+            step_px,
+            parity,
+            beyond: [poses[0]; 2],
+            times_s,
+            poses,
+            travel: Travel::default(),
+        };
         if !field.is_global() {
             field.beyond =
                 [0, field.last_node()].map(|node| path.pose(field.time_s(field.row_of_node(node))));
-            field.ways = Ways::new(&field);
+            field.travel = Travel::new(&field);
         }
         field
     }
@@ -112,25 +119,25 @@ impl Field {
     }
 
     /// How far the camera turns and moves from one node to a later one.
-    pub fn way_between(&self, from: usize, to: usize) -> Motion {
-        let Ways { turned, moved_m, .. } = &self.ways;
+    pub fn travel_between(&self, from: usize, to: usize) -> Motion {
+        let Travel { turned, moved_m, .. } = &self.travel;
         Motion { turn: turned[to] - turned[from], shift_m: moved_m[to] - moved_m[from] }
     }
 
     /// How far the camera turns and moves in one row, at most.
     pub fn most_in_a_row(&self) -> Motion {
-        self.ways.most
+        self.travel.most
     }
 
-    /// By how much a row's way differs from the next one's, near the interval behind a node.
+    /// By how much a row's travel differs from the next one's, near the interval behind a node.
     pub fn change_behind(&self, node: usize) -> Motion {
-        self.ways.changes[node]
+        self.travel.changes[node]
     }
 }
 
-impl Ways {
+impl Travel {
     fn new(field: &Field) -> Self {
-        let mut ways = Self { turned: vec![0.0], moved_m: vec![0.0], ..Self::default() };
+        let mut travel = Self { turned: vec![0.0], moved_m: vec![0.0], ..Self::default() };
         let mut before: Option<[DVec3; 2]> = None;
         // At each node but the last.
         let mut at_nodes = Vec::with_capacity(field.last_node());
@@ -138,17 +145,17 @@ impl Ways {
             let [from, to] = [node, node + 1].map(|node| field.pose_of_node(node));
             let rows = field.row_of_node(node + 1) - field.row_of_node(node);
             let in_a_row =
-                [turn_between(from, to), to.position_ned_m - from.position_ned_m].map(|way| way / rows);
+                [turn_between(from, to), to.position_ned_m - from.position_ned_m].map(|step| step / rows);
             let [turn, shift_m] = in_a_row.map(DVec3::length);
-            ways.most = ways.most.max(Motion { turn, shift_m });
-            ways.turned.push(ways.turned[node] + rows * turn);
-            ways.moved_m.push(ways.moved_m[node] + rows * shift_m);
+            travel.most = travel.most.max(Motion { turn, shift_m });
+            travel.turned.push(travel.turned[node] + rows * turn);
+            travel.moved_m.push(travel.moved_m[node] + rows * shift_m);
             let change = before.map_or([0.0; 2], |before| [0, 1].map(|k| (in_a_row[k] - before[k]).length()));
             at_nodes.push(Motion { turn: change[0], shift_m: change[1] });
             before = Some(in_a_row);
         }
         let behind = |node: usize| at_nodes.get(node + 1).copied().unwrap_or_default();
-        ways.changes = (0..at_nodes.len()).map(|node| at_nodes[node].max(behind(node))).collect();
-        ways
+        travel.changes = (0..at_nodes.len()).map(|node| at_nodes[node].max(behind(node))).collect();
+        travel
     }
 }

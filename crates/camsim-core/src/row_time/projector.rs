@@ -13,7 +13,7 @@ use crate::{camera::CameraModel, pose::CameraPose};
 /// Rows by which the picture may move while a row is read. The reserve to 1 is for the movement outside of the
 /// picture, where the gains are larger.
 const MOST_SPEED: f64 = 0.5;
-/// Largest deviation of the way of a point from a straight line between two rows, pixels.
+/// Largest deviation of the path of a point from a straight line between two rows, pixels.
 const STRAIGHT_PX: f64 = 3e-4;
 /// Steps from row to row, at most.
 const MOST_STEPS: usize = 6;
@@ -96,7 +96,7 @@ struct Row {
 struct Limits {
     speed: [f64; 2],
     curve_px: [f64; 2],
-    /// Way of the camera during the readout.
+    /// Path of the camera during the readout.
     travel_m: f64,
 }
 
@@ -145,7 +145,7 @@ impl Limits {
         let [turn, shift, turn_change, shift_change] = most;
         let speed_px = [gain.turn_px * turn, gain.shift_px * shift];
         // A parabola is an eighth of its second difference away from its chord. The projection itself bends by
-        // the square of the way over the focal length.
+        // the square of the path over the focal length.
         let bend_px = speed_px[0] * speed_px[0] / frame.camera.focal_px.min_element();
         let limits = Self {
             speed: speed_px.map(|px| px / field.step_px),

@@ -7,9 +7,9 @@
 //! - nothing is there if both misses have one sign and their sum is more than the miss can change by;
 //! - at most one solution is there if the picture moves by less than a row while a row is read;
 //! - else each half of it is looked at, down to the intervals from row to row. In these, an extremum is closed in
-//!   on by golden section where the change of the way from row to row lets it reach 0.
+//!   on by golden section where the change of the travel from row to row lets it reach 0.
 //!
-//! The bound is exact for what stands still. Of what moves it takes the way between two instants for at most
+//! The bound is exact for what stands still. Of what moves it takes the path between two instants for at most
 //! [`OWN_WAY`] times their distance.
 
 use glam::{DVec2, DVec3};
@@ -23,8 +23,8 @@ const INTERVALS_A_TURN: f64 = 12.0;
 const MOST_INTERVALS: usize = 64;
 /// What gains outside of the picture, and between the positions at which they are known, have beyond those.
 const GAIN_RESERVE: f64 = 1.25;
-/// Way of a point that moves, as a multiple of the distance between its ends.
-const OWN_WAY: f64 = 1.5;
+/// Path of a point that moves, as a multiple of the distance between its ends.
+const OWN_PATH: f64 = 1.5;
 /// Evaluations that close in on a solution between two rows, at most, and the miss that ends them, rows.
 const MOST_EVALUATIONS: usize = 40;
 const EXACT: f64 = 1e-7;
@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
         match (low_sample, high_sample) {
             // Beyond the lens at both, the point may come into the picture between.
             (None, None) => {
-                let turn = self.field.way_between(from, to).turn;
+                let turn = self.field.travel_between(from, to).turn;
                 if to - from == 1 || turn <= 2.0 * self.frame.lens_margin_rad {
                     return;
                 }
@@ -168,9 +168,9 @@ impl<'a> Search<'a> {
         if range_m > shift_m { shift_m / (range_m - shift_m) } else { f64::INFINITY }
     }
 
-    fn own_way_m(ends: &[Sample]) -> f64 {
+    fn own_path_m(ends: &[Sample]) -> f64 {
         match ends {
-            [a, b] => a.position_ned_m.zip(b.position_ned_m).map_or(0.0, |(a, b)| OWN_WAY * a.distance(b)),
+            [a, b] => a.position_ned_m.zip(b.position_ned_m).map_or(0.0, |(a, b)| OWN_PATH * a.distance(b)),
             _ => 0.0,
         }
     }
@@ -180,22 +180,22 @@ impl<'a> Search<'a> {
     fn is_monotone(&self, from: usize, a: &Sample, to: usize, b: &Sample) -> bool {
         let rows = self.field.row_of_node(to) - self.field.row_of_node(from);
         let (ends, most) = ([*a, *b], self.field.most_in_a_row());
-        let own_way_m = Self::own_way_m(&ends);
-        let way_m = self.field.way_between(from, to).shift_m + own_way_m;
+        let own_path_m = Self::own_path_m(&ends);
+        let travel_m = self.field.travel_between(from, to).shift_m + own_path_m;
         let range_m = a.range_m.max(b.range_m);
-        if way_m > 0.0 && range_m <= way_m {
+        if travel_m > 0.0 && range_m <= travel_m {
             return false;
         }
-        let shift_m = most.shift_m + own_way_m / rows;
-        let angle = if range_m == f64::INFINITY { 0.0 } else { shift_m / (range_m - way_m) };
+        let shift_m = most.shift_m + own_path_m / rows;
+        let angle = if range_m == f64::INFINITY { 0.0 } else { shift_m / (range_m - travel_m) };
         self.gain * (most.turn + angle) < 1.0
     }
 
     /// Whether the point may be shown in the picture by a row between two nodes, whose misses have one sign.
     fn may_reach(&self, from: usize, to: usize, ends: &[Sample]) -> bool {
-        let way = self.field.way_between(from, to);
-        let shift = self.angle_of_shift(way.shift_m + Self::own_way_m(ends), ends);
-        let most = self.gain * (way.turn + shift);
+        let travel = self.field.travel_between(from, to);
+        let shift = self.angle_of_shift(travel.shift_m + Self::own_path_m(ends), ends);
+        let most = self.gain * (travel.turn + shift);
         let rows = self.field.row_of_node(to) - self.field.row_of_node(from);
         let sum = |part: fn(&Sample) -> f64| ends.iter().map(part).sum::<f64>();
         sum(|end| end.least_miss.abs()) <= most + rows && sum(|end| end.beside) <= most
@@ -258,11 +258,11 @@ impl<'a> Search<'a> {
         let ends = [*a, *b];
         let [low, high] = [node, node + 1].map(|node| self.field.row_of_node(node));
         let change = self.field.change_behind(node);
-        let way = self.field.way_between(node, node + 1);
-        let own = self.angle_of_shift(Self::own_way_m(&ends), &ends);
-        let moved = self.gain * (way.turn + self.angle_of_shift(way.shift_m, &ends) + own);
+        let travel = self.field.travel_between(node, node + 1);
+        let own = self.angle_of_shift(Self::own_path_m(&ends), &ends);
+        let moved = self.gain * (travel.turn + self.angle_of_shift(travel.shift_m, &ends) + own);
         // A parabola is an eighth of its second difference away from its chord. The projection itself bends by
-        // the square of the way over the focal length.
+        // the square of the travel over the focal length.
         let focal = self.frame.camera.focal_px.min_element() / self.field.step_px;
         let second = self.gain * (change.turn + self.angle_of_shift(change.shift_m, &ends) + own)
             + 2.0 * moved * moved / focal;

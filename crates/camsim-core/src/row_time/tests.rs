@@ -181,7 +181,7 @@ fn both_solutions_of_a_close_pair_are_found() {
         let spec = ShutterSpec { readout_ms: 30.0, readout, ..ShutterSpec::default() };
         let frame = FrameCamera::new(path.clone(), camera.clone(), &shutter(spec), 0.5);
         let pose = path.pose(0.5);
-        // Over the whole way of the picture, near and far.
+        // Over the whole picture, near and far.
         let points = (0..750).map(|i| {
             let px = DVec2::new(f64::from(i % 30) * 10.0 - 120.0, f64::from(i / 30) * 8.0 - 76.0);
             let ray = pose.ned_from_camera * camera.unproject(px).unwrap().extend(1.0);

@@ -238,9 +238,9 @@ mod tests {
     /// Depth of a triangle along the ray (u, v, 1); `None` if it is missed.
     fn depth([a, b, c]: [DVec3; 3], uv: DVec2) -> Option<f64> {
         let normal = (b - a).cross(c - a);
-        let way = uv.extend(1.0);
-        let t = normal.dot(a) / normal.dot(way);
-        let inside = |from: DVec3, to: DVec3| (to - from).cross(t * way - from).dot(normal) >= 0.0;
+        let ray = uv.extend(1.0);
+        let t = normal.dot(a) / normal.dot(ray);
+        let inside = |from: DVec3, to: DVec3| (to - from).cross(t * ray - from).dot(normal) >= 0.0;
         (t > 0.0 && inside(a, b) && inside(b, c) && inside(c, a)).then_some(t)
     }
 

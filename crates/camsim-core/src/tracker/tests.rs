@@ -240,7 +240,7 @@ fn a_step_is_taken_without_overshoot_or_chatter() {
 }
 
 #[test]
-fn yaw_takes_the_shorter_way_through_180() {
+fn yaw_takes_the_shorter_arc_through_180() {
     let rows: Vec<_> = (0..400)
         .map(|i| {
             let t_s = 0.025 * f64::from(i);

@@ -23,7 +23,7 @@ pub fn exp(rotation_vector: DVec3) -> DQuat {
     DQuat::from_xyzw(v.x, v.y, v.z, cos_half)
 }
 
-/// Rotation vector of a unit quaternion, the short way: length in [0, pi]. Inverse of [`exp`] there.
+/// Rotation vector of a unit quaternion, along the shorter arc: length in [0, pi]. Inverse of [`exp`] there.
 pub fn log(rotation: DQuat) -> DVec3 {
     let sign = if rotation.w < 0.0 { -1.0 } else { 1.0 };
     let v = DVec3::new(rotation.x, rotation.y, rotation.z) * sign;

@@ -65,9 +65,9 @@ pub(super) struct Swept {
     pub motion: Arc<RigidMotion>,
     /// What it carries, at path time 0.
     pub bounds: Aabb,
-    /// Parts of the way from it along the sun's rays, metres: the first is itself, the others are those on
+    /// Segments of the path from it along the sun's rays, metres: the first is itself, the others are those on
     /// which a shadow may meet something.
-    pub ways_ned_m: Vec<[DVec3; 2]>,
+    pub segments_ned_m: Vec<[DVec3; 2]>,
     /// Room around its projected corners, pixels.
     room_px: f64,
     /// First and last position across the rows of the readout at which it may be, pixels.
@@ -75,9 +75,14 @@ pub(super) struct Swept {
 }
 
 impl Swept {
-    pub fn new(motion: Arc<RigidMotion>, bounds: Aabb, ways_ned_m: Vec<[DVec3; 2]>, room_px: f64) -> Self {
+    pub fn new(
+        motion: Arc<RigidMotion>,
+        bounds: Aabb,
+        segments_ned_m: Vec<[DVec3; 2]>,
+        room_px: f64,
+    ) -> Self {
         let across_px = [f64::NEG_INFINITY, f64::INFINITY];
-        Self { motion, bounds, ways_ned_m, room_px: room_px.max(ROOM_PX), across_px }
+        Self { motion, bounds, segments_ned_m, room_px: room_px.max(ROOM_PX), across_px }
     }
 
     /// With the rows of the readout that it can be in, which spares the others a look.
@@ -92,7 +97,10 @@ impl Swept {
             let axis = usize::from(plan.shutter.row_axis() == RowAxis::Rows);
             [projected.low_px[axis], projected.high_px[axis]]
         };
-        let all = self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way), &self));
+        let all = self
+            .segments_ned_m
+            .iter()
+            .filter_map(|segment| project(plan, &poses, &along(&swept, segment), &self));
         let across_px = all.map(ends).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
         Self { across_px: across_px.unwrap_or(self.across_px), ..self }
     }
@@ -119,8 +127,8 @@ impl Swept {
             (0..=INSTANTS).map(|i| begin_s + (end_s - begin_s) * f64::from(i) / f64::from(INSTANTS));
         let positions_ned_m: Vec<DVec3> = instants_s.map(|t_s| path.pose(t_s).position_ned_m).collect();
         let key_poses = if plan.keys.is_empty() { vec![plan.key_pose] } else { plan.key_poses() };
-        let may_be_seen = |way: &[DVec3; 2]| {
-            let swept = along(&swept, way);
+        let may_be_seen = |segment: &[DVec3; 2]| {
+            let swept = along(&swept, segment);
             key_poses.iter().any(|key_pose| {
                 let distance_m = |position_ned_m: &DVec3| position_ned_m.distance(key_pose.position_ned_m);
                 let reach_m = TRAVEL * positions_ned_m.iter().map(distance_m).fold(0.0, f64::max);
@@ -128,9 +136,10 @@ impl Swept {
                 Frustum::new(key_pose, plan.tangents()).may_see(&swept)
             })
         };
-        let ways_ned_m: Vec<[DVec3; 2]> = self.ways_ned_m.iter().copied().filter(may_be_seen).collect();
-        let seen = Self { motion: self.motion.clone(), ways_ned_m, ..*self };
-        (!seen.ways_ned_m.is_empty()).then_some(seen)
+        let segments_ned_m: Vec<[DVec3; 2]> =
+            self.segments_ned_m.iter().copied().filter(may_be_seen).collect();
+        let seen = Self { motion: self.motion.clone(), segments_ned_m, ..*self };
+        (!seen.segments_ned_m.is_empty()).then_some(seen)
     }
 
     /// Where its parts may be seen during the exposure of a row, those that are not behind the camera. Each is
@@ -145,13 +154,16 @@ impl Swept {
             let t_s = mid_s + phase * exposure_s;
             (t_s, path.pose(t_s))
         });
-        self.ways_ned_m.iter().filter_map(|way| project(plan, &poses, &along(&swept, way), self)).collect()
+        self.segments_ned_m
+            .iter()
+            .filter_map(|segment| project(plan, &poses, &along(&swept, segment), self))
+            .collect()
     }
 }
 
-/// A box that is shifted by a way, from its one end to the other.
-fn along(bounds: &Aabb, way: &[DVec3; 2]) -> Aabb {
-    let [from, to] = way;
+/// A box that is shifted along a segment, from its one end to the other.
+fn along(bounds: &Aabb, segment: &[DVec3; 2]) -> Aabb {
+    let [from, to] = segment;
     Aabb { min: bounds.min + from.min(*to), max: bounds.max + from.max(*to) }
 }
 

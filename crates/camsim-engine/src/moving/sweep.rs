@@ -7,15 +7,15 @@ use glam::DVec3;
 
 use super::outline::Swept;
 
-/// Most parts of the way of a shadow.
+/// Most segments of the path of a shadow.
 const MOST_PARTS: f64 = 64.0;
 
-/// All that moves in a scene, with the ways of its shadows between two path times.
+/// All that moves in a scene, with the paths of its shadows between two path times.
 pub(super) fn all_that_moves(scene: &Scene, window_s: [f64; 2]) -> Vec<Swept> {
     let with_shadow = |(motion, bounds): (Arc<RigidMotion>, Aabb)| {
-        let mut ways_ned_m = vec![[DVec3::ZERO; 2]];
-        ways_ned_m.extend(shadow_ways(scene, &motion.bounds(&bounds, window_s[0], window_s[1])));
-        Swept::new(motion, bounds, ways_ned_m, 0.0)
+        let mut segments_ned_m = vec![[DVec3::ZERO; 2]];
+        segments_ned_m.extend(shadow_segments(scene, &motion.bounds(&bounds, window_s[0], window_s[1])));
+        Swept::new(motion, bounds, segments_ned_m, 0.0)
     };
     motions(scene).into_iter().map(with_shadow).collect()
 }
@@ -33,9 +33,9 @@ fn motions(scene: &Scene) -> Vec<(Arc<RigidMotion>, Aabb)> {
     motions
 }
 
-/// Parts of the way of a box along the sun's rays on which it may meet something that stands still and has
+/// Segments of the path of a box along the sun's rays on which it may meet something that stands still and has
 /// sunlight.
-fn shadow_ways(scene: &Scene, caster: &Aabb) -> Vec<[DVec3; 2]> {
+fn shadow_segments(scene: &Scene, caster: &Aabb) -> Vec<[DVec3; 2]> {
     let Some(light) = scene.light.filter(|light| light.shadows) else { return Vec::new() };
     let is_lit = |mesh: &&camsim_core::scene::Mesh| mesh.motion.is_none() && mesh.shape.has_normals();
     let models: Vec<Aabb> = scene.meshes.iter().filter(is_lit).map(|mesh| mesh.bounds()).collect();
@@ -45,22 +45,22 @@ fn shadow_ways(scene: &Scene, caster: &Aabb) -> Vec<[DVec3; 2]> {
         return Vec::new();
     }
     let away = -light.to_sun_ned;
-    let length_m = way_to_leave_m(caster, &catchers, away);
+    let length_m = distance_to_leave_m(caster, &catchers, away);
     let size_m = (caster.max - caster.min).length();
     let part_m = (length_m / MOST_PARTS).max(size_m).max(f64::MIN_POSITIVE);
     let parts = (length_m / part_m).ceil() as u32;
-    let ways = (0..parts).map(|k| [k, k + 1].map(|end| (f64::from(end) * part_m).min(length_m) * away));
+    let segments = (0..parts).map(|k| [k, k + 1].map(|end| (f64::from(end) * part_m).min(length_m) * away));
     let may_meet = |[from, to]: &[DVec3; 2]| {
         let part = Aabb { min: caster.min + from.min(*to), max: caster.max + from.max(*to) };
         let terrain = scene.terrain.as_ref();
         terrain.is_some_and(|terrain| terrain.may_meet(&part))
             || models.iter().any(|model| model.meets(&part))
     };
-    ways.filter(may_meet).collect()
+    segments.filter(may_meet).collect()
 }
 
 /// How far a box goes along a direction until it has left another one, or will never meet it.
-fn way_to_leave_m(moving: &Aabb, other: &Aabb, direction: DVec3) -> f64 {
+fn distance_to_leave_m(moving: &Aabb, other: &Aabb, direction: DVec3) -> f64 {
     let leave = |axis: usize| {
         let room_m = if direction[axis] > 0.0 {
             other.max[axis] - moving.min[axis]

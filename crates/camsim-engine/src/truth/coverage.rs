@@ -3,7 +3,7 @@
 //! A pixel is an area of 1 x 1 and an exposure of its row. Its coverage is the fraction of rays through that box
 //! that meet the object that the pixel's centre sees at mid-exposure. Only pixels near a border between objects
 //! (or the sky) can have less than 1: those within the reach of a pixel that has another object beside it. The
-//! reach of a pixel is the way of its point in the picture during the exposure, plus 1 px.
+//! reach of a pixel is the path of its point in the picture during the exposure, plus 1 px.
 
 use camsim_core::{pose::CameraPose, shutter::RowAxis};
 use glam::DVec2;
@@ -16,7 +16,7 @@ use super::{
 
 /// Rays of a pixel near a border.
 pub(crate) const RAYS: u32 = 64;
-/// Exposure phases between which the way of a point is measured: vibration may turn it back.
+/// Exposure phases between which the path of a point is measured: vibration may turn it back.
 const PHASES: i32 = 8;
 /// Longest reach, pixels. Beyond it a picture is all blur.
 const MOST_REACH_PX: f64 = 256.0;
@@ -128,10 +128,10 @@ fn near_borders(pixels: &FramePixels<'_>, objects: &[Option<u32>]) -> Vec<bool> 
 fn reach_px(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> usize {
     let phases = (-PHASES..=PHASES).map(|k| 0.5 * f64::from(k) / f64::from(PHASES));
     // A point that its camera does not show at an instant has left the picture.
-    let way_px = phases
+    let path_px = phases
         .map(|phase| moved_px(pixels, pixel, phase).map_or(MOST_REACH_PX, |px| px.abs().max_element()))
         .fold(0.0, f64::max);
-    (way_px.min(MOST_REACH_PX) + 1.0) as usize
+    (path_px.min(MOST_REACH_PX) + 1.0) as usize
 }
 
 fn index(pixels: &FramePixels<'_>, [x, y]: [i64; 2]) -> Option<usize> {

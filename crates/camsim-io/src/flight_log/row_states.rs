@@ -13,7 +13,7 @@ use super::{
     text_table::{Table, is_missing},
 };
 
-/// The way through all rows over the sum of the ways of each receiver, from which on they are several. Parts of
+/// The path through all rows over the sum of the paths of each receiver, from which on they are several. Parts of
 /// one flight give 1 at most.
 const MIN_ZIGZAG: f64 = 1.5;
 /// Steps as often longer than those before and after them are jumps.
@@ -52,7 +52,7 @@ fn located(rows: &[ParsedRow]) -> Vec<usize> {
 struct Track {
     rows: usize,
     last: [f64; 3],
-    way: f64,
+    length: f64,
 }
 
 /// The tracks of the values of a column, and how often the value changes.
@@ -74,14 +74,14 @@ fn receiver_column<'a>(
     let mut columns: Vec<Option<Tracks<'_>>> =
         (0..table.columns).map(|column| (!used.contains(&column)).then(Tracks::default)).collect();
     let mut fields = Vec::new();
-    let mut way = 0.0;
+    let mut length = 0.0;
     let mut before: Option<[f64; 3]> = None;
     for &row in located {
         if columns.iter().all(Option::is_none) {
             return None;
         }
         let position = rows[row].position;
-        way += before.map_or(0.0, |before| distance(layout.frame, before, position));
+        length += before.map_or(0.0, |before| distance(layout.frame, before, position));
         before = Some(position);
         table.separator.split(table.rows[row].text, &mut fields);
         for (column, tracks) in columns.iter_mut().enumerate() {
@@ -92,8 +92,8 @@ fn receiver_column<'a>(
             tracks_of.changes += usize::from(value != tracks_of.last);
             tracks_of.last = value;
             let track =
-                tracks_of.by_value.entry(value).or_insert(Track { rows: 0, last: position, way: 0.0 });
-            track.way += distance(layout.frame, track.last, position);
+                tracks_of.by_value.entry(value).or_insert(Track { rows: 0, last: position, length: 0.0 });
+            track.length += distance(layout.frame, track.last, position);
             (track.last, track.rows) = (position, track.rows + 1);
             if tracks_of.by_value.len() > MAX_RECEIVERS {
                 *tracks = None;
@@ -101,11 +101,11 @@ fn receiver_column<'a>(
         }
     }
     let zigzag = |tracks: &Tracks<'_>| {
-        let apart: f64 = tracks.by_value.values().map(|track| track.way).sum();
+        let apart: f64 = tracks.by_value.values().map(|track| track.length).sum();
         let is_interleaved = tracks.by_value.len() > 1
             && tracks.by_value.values().all(|track| track.rows >= MIN_ROWS)
             && tracks.changes * 10 >= located.len();
-        if is_interleaved && way > 0.0 { way / apart } else { 0.0 }
+        if is_interleaved && length > 0.0 { length / apart } else { 0.0 }
     };
     let candidates = columns.iter().enumerate().filter_map(|(column, tracks)| {
         let tracks = tracks.as_ref()?;

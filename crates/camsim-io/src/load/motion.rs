@@ -82,8 +82,8 @@ fn table_keys(
 ) -> Option<Keys> {
     let position = Curve::smooth(times_s.clone(), positions)?;
     let looking = || {
-        let ways: Vec<DVec3> = (0..times_s.len()).map(|k| position.rate_at_key(k)).collect();
-        looking_along(&ways)
+        let directions: Vec<DVec3> = (0..times_s.len()).map(|k| position.rate_at_key(k)).collect();
+        looking_along(&directions)
     };
     let rotations = match rotations {
         Some(rotations) => rotations,
@@ -108,9 +108,9 @@ fn path_keys(motion: &MotionSpec, mut points: Vec<DVec3>) -> Option<Keys> {
         at_s += pair[0].distance(pair[1]) / speed_m_s;
         times_s.push(at_s);
     }
-    let ways: Vec<DVec3> = points.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let directions: Vec<DVec3> = points.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let rotation = match motion.orient.unwrap_or(true) {
-        true => Curve::new(times_s[..ways.len()].to_vec(), looking_along(&ways), Between::Step)?,
+        true => Curve::new(times_s[..directions.len()].to_vec(), looking_along(&directions), Between::Step)?,
         false => Curve::constant(DQuat::IDENTITY),
     };
     let repeat = Repeat { from_s: 0.0, period_s: at_s, always: false };
@@ -122,18 +122,20 @@ fn path_keys(motion: &MotionSpec, mut points: Vec<DVec3>) -> Option<Keys> {
     })
 }
 
-/// Rotations of a body whose nose looks along each way, without roll. A body that stands looks as before, at
+/// Rotations of a body whose nose looks along each direction, without roll. A body that stands looks as before, at
 /// first as it will.
-fn looking_along(ways: &[DVec3]) -> Vec<DQuat> {
-    let look = |way: &DVec3| {
-        let (yaw, pitch) = (way.y.atan2(way.x), (-way.z).atan2(way.x.hypot(way.y)));
+fn looking_along(directions: &[DVec3]) -> Vec<DQuat> {
+    let look = |direction: &DVec3| {
+        let (yaw, pitch) =
+            (direction.y.atan2(direction.x), (-direction.z).atan2(direction.x.hypot(direction.y)));
         DQuat::from_rotation_z(yaw) * DQuat::from_rotation_y(pitch)
     };
-    let moves = |way: &&DVec3| way.length() > 1e-9;
-    let mut last = ways.iter().find(moves).map_or(DQuat::IDENTITY, look);
-    ways.iter()
-        .map(|way| {
-            last = if moves(&way) { look(way) } else { last };
+    let moves = |direction: &&DVec3| direction.length() > 1e-9;
+    let mut last = directions.iter().find(moves).map_or(DQuat::IDENTITY, look);
+    directions
+        .iter()
+        .map(|direction| {
+            last = if moves(&direction) { look(direction) } else { last };
             last
         })
         .collect()
@@ -177,7 +179,7 @@ mod tests {
                 .map(|v| v.to_array().map(|x| (x * 1e6).round() / 1e6))
         };
         let [north, east, still] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]];
-        let times = |way: [f64; 3], speed: f64| way.map(|x| x * speed);
+        let times = |direction: [f64; 3], speed: f64| direction.map(|x| x * speed);
         let begin = [[0.0; 3], still, north];
         for (repeat, t_s, expected) in [
             (None, -5.0, begin),
@@ -194,11 +196,11 @@ mod tests {
     }
 
     #[test]
-    fn noses_look_along_their_ways_without_roll() {
-        let way = DVec3::new(1.0, 2.0, -0.5);
-        let looks = looking_along(&[DVec3::ZERO, way, DVec3::ZERO, -DVec3::Y]);
+    fn noses_look_along_their_directions_without_roll() {
+        let direction = DVec3::new(1.0, 2.0, -0.5);
+        let looks = looking_along(&[DVec3::ZERO, direction, DVec3::ZERO, -DVec3::Y]);
         let nose = |k: usize| looks[k] * DVec3::X;
-        assert!((0..3).all(|k| nose(k).distance(way.normalize()) < 1e-12));
+        assert!((0..3).all(|k| nose(k).distance(direction.normalize()) < 1e-12));
         assert!(nose(3).distance(-DVec3::Y) < 1e-12 && (looks[1] * DVec3::Y).z.abs() < 1e-12);
     }
 

@@ -50,7 +50,7 @@ pub(super) fn backslash_advice(line: &str) -> Option<String> {
     None
 }
 
-/// The two ways to write a path with backslashes.
+/// The two forms of a path with backslashes.
 fn advice(written: &str) -> String {
     // A path may begin with the name of a server: two backslashes that are no escape.
     let slashes = match written.strip_prefix(r"\\") {

@@ -43,7 +43,7 @@ pub enum MethodFamily {
     Size,
 }
 
-/// One way to render a case.
+/// One method to render a case.
 #[derive(Clone, Debug)]
 pub struct Method {
     /// Name, unique within a case.

@@ -330,7 +330,7 @@ fn inverse_table(setup: &Setup<'_>) -> Result<Table, ReproduceError> {
             "pixels with a ray",
             "Gauss-Newton misses, of these",
             "its false roots, of all",
-            "camsim: worst way there and back, px",
+            "camsim: worst round trip, px",
         ],
     );
     for calibration in &calibrations(setup.width_px) {

@@ -4,7 +4,7 @@
 //! both. How far apart the two are depends on what reads the ideal frame: reads all over a pixel's area mend
 //! stairs, one bilinear read of a frame three times as fine hardly does.
 //!
-//! Straight borders that run every way have a spectrum: of length L in an area A and contrast C, `C^2 L / A /
+//! Straight borders that run in every direction have a spectrum: of length L in an area A and contrast C, `C^2 L / A /
 //! (4 pi^3 f^3)` for each square cycle. Nothing filters it before the ideal frame but the samples of its
 //! pixels, if these have several, and with what the reads leave of its waves and of those that look like them
 //! (`transfer.rs`) the squared error of a pixel is a sum over frequencies, as that of textures is.
@@ -34,7 +34,7 @@ use crate::ir::{
 /// Frequencies that count, cycles an ideal pixel.
 const LOWEST: f64 = 0.031_25;
 const OCTAVES: f64 = 9.0;
-/// Waves that stand for all: of 252 ways to read borders whose pixels have one sample their RMS is 0.96 to
+/// Waves that stand for all: of 252 methods to read borders whose pixels have one sample their RMS is 0.96 to
 /// 1.10 times that of 30 000 waves, 2 % off in the RMS.
 const WAVES: u32 = 288;
 /// Waves for means over areas, which leave so little that each missing wave weighs more: of wide ones with

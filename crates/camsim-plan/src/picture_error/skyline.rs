@@ -20,7 +20,7 @@ use crate::{
 
 /// From so many crossings on they give its length more surely than the probes near it do.
 const ENOUGH: f64 = 24.0;
-/// Part of [`camsim_core::temporal::SKY_REACH_PX`] at which a straight border is found whichever way it runs:
+/// Part of [`camsim_core::temporal::SKY_REACH_PX`] at which a straight border is found whichever direction it runs in:
 /// that of eight directions.
 const REACHED: f64 = 0.92;
 

@@ -181,10 +181,10 @@ impl DryRun<'_> {
 
     /// What stands between two points.
     fn occluder(&self, from_m: DVec3, point_m: DVec3) -> Option<DVec3> {
-        let way_m = point_m - from_m;
+        let ray_m = point_m - from_m;
         self.surfaces
-            .first_hit(from_m, way_m)
+            .first_hit(from_m, ray_m)
             .filter(|hit| hit.depth_m < 1.0 - HIDDEN)
-            .map(|hit| from_m + hit.depth_m * way_m)
+            .map(|hit| from_m + hit.depth_m * ray_m)
     }
 }

@@ -165,7 +165,7 @@ impl<'a> FrameRays<'a> {
     }
 
     /// Whether at path time `t_s` a surface lies between a camera and what it sees along a ray at planar depth
-    /// `depth_m` (infinite for the sky), leaving out the last millionth of the way.
+    /// `depth_m` (infinite for the sky), leaving out the last millionth of the path.
     #[must_use]
     pub fn is_hidden(&self, t_s: f64, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
         let hit = self.surfaces.first_hit_at(t_s, position_ned_m, ray_ned);
@@ -285,7 +285,7 @@ impl PixelWalk<'_> {
     }
 }
 
-/// Part of the way to a point that rounding may take for a surface in front of it.
+/// Part of the path to a point that rounding may take for a surface in front of it.
 const LAST_PART: f64 = 1e-6;
 /// Relative difference of the depths that the two triangles of an edge give to a ray that hits it: rounding.
 const ON_AN_EDGE: f64 = 1e-9;

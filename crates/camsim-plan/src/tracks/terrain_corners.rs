@@ -80,8 +80,8 @@ fn seen_part(surfaces: &Surfaces, terrain: &Terrain, views: &Views) -> Option<Pa
                 f64::from(ray / RAYS[0]) / f64::from(RAYS[1] - 1),
             );
             let Some(uv) = camera.unproject(fraction * last_px) else { continue };
-            let way = pose.ned_from_camera * uv.extend(1.0);
-            let hit = surfaces.first_hit(pose.position_ned_m, way).and_then(|hit| hit.terrain);
+            let ray_ned = pose.ned_from_camera * uv.extend(1.0);
+            let hit = surfaces.first_hit(pose.position_ned_m, ray_ned).and_then(|hit| hit.terrain);
             let Some(hit) = hit else { continue };
             let chunk = [hit.chunk % terrain.chunk_grid[0], hit.chunk / terrain.chunk_grid[0]];
             let cell = [0, 1].map(|k| CHUNK_CELLS * chunk[k] + hit.cell[k]);

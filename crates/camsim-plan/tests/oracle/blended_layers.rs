@@ -108,7 +108,7 @@ fn each_layer_has_its_own_fog_and_light_of_its_own_is_as_clear_as_it() {
     shining.material.emissive = [0.1, 0.2, 0.3];
     let (found, _) = looks(vec![level(WALL, 1.0, 0.0), shining.clone()], Some(200.0));
     // Through the air between the wall and the pane, the pane, and the air before it.
-    let air = |color: DVec3, way_m: f64| SKY + (-3.912 * way_m / 200.0_f64).exp() * (color - SKY);
+    let air = |color: DVec3, path_m: f64| SKY + (-3.912 * path_m / 200.0_f64).exp() * (color - SKY);
     let expected = air(over(RED + DVec3::new(0.1, 0.2, 0.3), 0.3, air(WALL, 40.0)), 60.0);
     assert!(found.distance(expected) < 1e-6, "{found} {expected}");
 }

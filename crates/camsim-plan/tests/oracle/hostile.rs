@@ -70,7 +70,7 @@ fn cameras_inside_and_below_see_surfaces_from_behind() {
             .is_some_and(|hit| (hit.point_ned_m.z - 300.0 + hit.depth_m).abs() < 1e-9)
     );
     assert_eq!(under.cast(below, DVec3::Z), None);
-    // In a closed box every way out is a wall.
+    // In a closed box every path out is a wall.
     let boxed = oracle(town(1));
     let middle =
         boxed.cast(DVec3::new(-320.0 + 1.0, 174.427_191 + 1.0, -500.0), DVec3::Z).unwrap().point_ned_m

@@ -108,7 +108,7 @@ fn a_rectangle_that_moves_sideways_is_sheared_by_the_readout() {
 }
 
 #[test]
-fn the_blur_of_an_edge_is_as_long_as_its_way() {
+fn the_blur_of_an_edge_is_as_long_as_its_path() {
     let (speed_m_s, exposure_ms, y) = (300.0, 40.0, 20);
     let speed_px_s = speed_m_s * FOCAL_PX / HEIGHT_M;
     let length_px = speed_px_s * 1e-3 * exposure_ms;

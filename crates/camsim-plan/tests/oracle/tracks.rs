@@ -108,8 +108,8 @@ fn misses(oracle: &Oracle, frame: u64, point_ned_m: DVec3, sighting: &Sighting) 
         let later_s = offset_px[axis] * slope;
         let sample = view.sample(pixel, offset_px, later_s / (1e-3 * shutter.exposure_ms)).unwrap();
         let ray = sample.pose.ned_from_camera * sample.uv.extend(1.0);
-        let way = point_ned_m - sample.pose.position_ned_m;
-        (way.cross(ray).length() / (ray.length() * way.length()), (sample.t_s - seen.t_s).abs())
+        let to_point = point_ned_m - sample.pose.position_ned_m;
+        (to_point.cross(ray).length() / (ray.length() * to_point.length()), (sample.t_s - seen.t_s).abs())
     };
     inside.map(of_pixel).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
 }

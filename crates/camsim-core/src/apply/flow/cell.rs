@@ -45,7 +45,7 @@ impl Cell {
             let forward = DMat2::IDENTITY + slope * fraction;
             let from_corner =
                 forward.inverse() * (position_px - self.origin_px - corner - fraction * self.flows[k]);
-            // Each pixel covers its half of the way to each neighbour. A torn edge has no overlap, because
+            // Each pixel covers its half of the distance to each neighbour. A torn edge has no overlap, because
             // the nearest pixel beyond belongs to another object.
             let [is_whole_across, is_whole_down] = self.intact_edges(corner, fraction);
             let own = |from_corner: f64, corner: f64, is_whole: bool| {

@@ -68,8 +68,8 @@ impl Grid {
         let [width, height] = self.size_px;
         let (x, y) =
             ([column.saturating_sub(1), column.min(width - 1)], [row.saturating_sub(1), row.min(height - 1)]);
-        let tear = |x: u32, y: u32, way: usize, is_ring: bool| {
-            if is_ring { 0.0 } else { f64::from(self.tears[(y * width + x) as usize][way]) }
+        let tear = |x: u32, y: u32, axis: usize, is_ring: bool| {
+            if is_ring { 0.0 } else { f64::from(self.tears[(y * width + x) as usize][axis]) }
         };
         Cell {
             origin_px: DVec2::new(f64::from(column) - 1.0, f64::from(row) - 1.0),
@@ -83,9 +83,9 @@ impl Grid {
     /// Flow at a corner of a cell. `at` counts from (-1, -1), and is at most one pixel outside of the image.
     fn corner(&self, [x, y]: [u32; 2], at: [u32; 2]) -> DVec2 {
         let mut flow = self.texel(x, y);
-        for (way, [dx, dy]) in [[1, 0], [0, 1]].into_iter().enumerate() {
-            let last = self.size_px[way] - 1;
-            let (inner, sign) = match at[way] {
+        for (axis, [dx, dy]) in [[1, 0], [0, 1]].into_iter().enumerate() {
+            let last = self.size_px[axis] - 1;
+            let (inner, sign) = match at[axis] {
                 0 => ([x, y], -1.0),
                 // Pixel `last` has index `last + 1`.
                 k if k > last + 1 => ([x - dx.min(x), y - dy.min(y)], 1.0),
@@ -93,7 +93,7 @@ impl Grid {
             };
             if last > 0 {
                 let step = self.texel(inner[0] + dx, inner[1] + dy) - self.texel(inner[0], inner[1]);
-                let tear = self.tears[(inner[1] * self.size_px[0] + inner[0]) as usize][way];
+                let tear = self.tears[(inner[1] * self.size_px[0] + inner[0]) as usize][axis];
                 // A difference that is mostly a tear is no slope.
                 if f64::from(tear) <= 0.5 * step.abs().max_element() {
                     flow += sign * step;

@@ -110,10 +110,10 @@ fn channels_do_not_mix() {
 }
 
 #[test]
-fn both_ways_of_a_gaussian_agree() {
+fn both_methods_for_a_gaussian_agree() {
     let colors = |x: f64, y: f64| [(0.3 * x).sin().abs(), if x > y { 1.0 } else { 0.0 }, 0.5];
     let by_taps = spread(gaussian(1.5), picture(colors));
-    // A disc of a thousandth of a pixel changes nothing but the way.
+    // A disc of a thousandth of a pixel changes nothing but the method.
     let by_transform = spread(PointSpreadSpec { defocus_px: Some(1e-3), ..gaussian(1.5) }, picture(colors));
     for (one, other) in by_taps.iter().zip(&by_transform) {
         assert!((one - other).abs() < 1e-3, "{one} {other}");

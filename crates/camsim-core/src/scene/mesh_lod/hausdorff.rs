@@ -36,8 +36,8 @@ pub(super) fn hausdorff_bound_m<const AXES: usize>(
     if one.is_empty() || other.is_empty() {
         return f64::INFINITY;
     }
-    let one_way = HausdorffSearch::new(points, other, tolerance_m).farthest_m(one, tolerance_m);
-    HausdorffSearch::new(points, one, tolerance_m).farthest_m(other, one_way)
+    let one_sided = HausdorffSearch::new(points, other, tolerance_m).farthest_m(one, tolerance_m);
+    HausdorffSearch::new(points, one, tolerance_m).farthest_m(other, one_sided)
 }
 
 /// Corners of a part of a triangle.

@@ -18,7 +18,7 @@ pub struct Curve<V> {
 pub enum Between<V> {
     /// The earlier key.
     Step,
-    /// A straight line; of rotations, one turn at a constant rate the short way (slerp).
+    /// A straight line; of rotations, one turn at a constant rate along the shorter arc (slerp).
     Linear,
     /// A cubic Hermite curve with these derivatives a second before and after each key; of quaternions, by
     /// their four parts, normalised.
@@ -34,7 +34,7 @@ pub enum Between<V> {
 struct Interval {
     key: usize,
     next: usize,
-    /// Fraction of the way from one to the other, 0 to 1.
+    /// Fraction of the interval from one to the other, 0 to 1.
     fraction: f64,
     /// Time between them; 0 beyond the ends.
     span_s: f64,
@@ -248,7 +248,7 @@ impl Curve<DQuat> {
     }
 }
 
-/// Rotation vector from one rotation to another in the outer axes, the short way.
+/// Rotation vector from one rotation to another in the outer axes, along the shorter arc.
 fn short_turn(a: DQuat, b: DQuat) -> DVec3 {
     so3::log((b * a.conjugate()).normalize())
 }

@@ -213,7 +213,7 @@ impl ChunkGrid<'_> {
         Vec3::from(self.vertices[(j * (self.cells[0] + 1) + i) as usize].offset_m).as_dvec3()
     }
 
-    /// Point on a grid line, at `fraction` of the way from a vertex to the one `step` further.
+    /// Point on a grid line, at `fraction` of the distance from a vertex to the one `step` further.
     fn between(&self, from: [i32; 2], step: [i32; 2], fraction: f64) -> DVec3 {
         let start = self.at(from[0], from[1]);
         if fraction == 0.0 {

@@ -1,6 +1,6 @@
 //! Parts of the terrain on which the sun shines everywhere, so that no ray has to find out.
 //!
-//! Let u be the horizontal way from the sun's side to the other, and g = cos(e) up + sin(e) u at the sun's
+//! Let u be the horizontal distance from the sun's side to the other, and g = cos(e) up + sin(e) u at the sun's
 //! elevation e. g is constant along the sun's rays, so a point is in the shadow of those before it (with
 //! smaller u) in its vertical plane towards the sun that have a greater g. Along that plane g rises over
 //! triangles that face the sun. A block of cells is therefore lit as a whole if all its triangles face the

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::{CHUNK_CELLS, Terrain, TerrainHit, cell_triangles};
 
-/// Most triangles that a walk crosses. Longer ways are left to [`Terrain::intersect`].
+/// Most triangles that a walk crosses. Longer paths are left to [`Terrain::intersect`].
 const MOST_STEPS: u32 = 24;
 
 /// A triangle of the full surface.
@@ -140,8 +140,8 @@ impl<'a> TerrainWalk<'a> {
     }
 
     /// Walks on to the triangle that `origin + t direction` hits, across triangles that face the origin. `None`
-    /// if the way leads to a triangle that faces away, to a void or off the terrain, or is long; the walk is
-    /// then anywhere on the way. The hit is on the same unfolded patch as the start, which need not be the
+    /// if the path leads to a triangle that faces away, to a void or off the terrain, or is long; the walk is
+    /// then anywhere on the path. The hit is on the same unfolded patch as the start, which need not be the
     /// first surface along the ray.
     #[must_use]
     #[inline]

@@ -1,7 +1,7 @@
 //! Which pixels of a frame another camera may not see, by what the frame itself shows.
 //!
 //! What a pixel sees is hidden from another position only if a border between two surfaces passes over it on the
-//! way of the camera there. In the frame's own picture that border is no farther from the pixel than the
+//! path of the camera there. In the frame's own picture that border is no farther from the pixel than the
 //! nearer surface's parallax. So a ray has to decide only within that reach of
 //!
 //! - two neighbours whose inverse depths differ by more than [`GAP_PX`] of parallax, and neither lie on one plane
@@ -26,7 +26,7 @@ use crate::truth::planes::FramePixels;
 const GAP_PX: f64 = 0.02;
 /// What the reach has beyond the parallax, pixels: both ends are between pixels.
 const MARGIN_PX: f64 = 2.0;
-/// Allowance of the way of a camera for what lies between the positions that are compared.
+/// Allowance of the path of a camera for what lies between the positions that are compared.
 const BETWEEN: f64 = 1.1;
 
 /// Pixels that a ray has to decide about.
@@ -87,8 +87,8 @@ impl<'a> Parallax<'a> {
         let corners = [[0, 0], [width / 2, height / 2], [width - 1, height - 1]];
         let from: Vec<DVec3> = corners.map(|pixel| pixels.rays.pose(pixel).position_ned_m).into();
         let to: Vec<DVec3> = target.poses().map(|pose| pose.position_ned_m).collect();
-        let ways = from.iter().flat_map(|from| to.iter().map(move |to| from.distance(*to)));
-        let travel_m = BETWEEN * ways.fold(0.0, f64::max);
+        let distances = from.iter().flat_map(|from| to.iter().map(move |to| from.distance(*to)));
+        let travel_m = BETWEEN * distances.fold(0.0, f64::max);
         let px_m = ImageGain::new(&pixels.plan.camera).shift_px * travel_m;
         let mut parallax = Self { pixels, px_m, ends_ned_m: [*to.first()?, *to.last()?], border_reach: 0 };
         let nearest_m = pixels.rays.nearest_m(travel_m);

@@ -205,9 +205,9 @@ fn shown(
             continue;
         }
         let (_, t_s, pose) = &instants[k];
-        let way = point.position_ned_m(*t_s)? - pose.position_ned_m;
+        let direction = point.position_ned_m(*t_s)? - pose.position_ned_m;
         let hides = |beside: DVec3| {
-            let hit = oracle.cast_at(*t_s, pose.position_ned_m, way + beside);
+            let hit = oracle.cast_at(*t_s, pose.position_ned_m, direction + beside);
             hit.is_some_and(|hit| hit.depth_m < 0.999)
         };
         let is_hidden = hides(DVec3::ZERO);

@@ -147,9 +147,9 @@ impl Tree {
             // Refused later, with the names.
             return Ok(());
         }
-        let (mut way, mut outside) = (vec![frame.to_string()], vec![false; samples.len()]);
+        let (mut chain, mut outside) = (vec![frame.to_string()], vec![false; samples.len()]);
         while let Some((link, parent)) = self.above(&frame)? {
-            if way.len() > MAX_LINKS || way.contains(&parent.to_string()) {
+            if chain.len() > MAX_LINKS || chain.contains(&parent.to_string()) {
                 return Err(format!("the transforms above `{frame}` go in a circle"));
             }
             for (sample, outside) in samples.iter_mut().zip(&mut outside) {
@@ -161,12 +161,12 @@ impl Tree {
                 sample.frame = parent.clone();
             }
             frame = parent.clone();
-            way.push(frame.to_string());
+            chain.push(frame.to_string());
         }
-        if way.len() > 1 {
+        if chain.len() > 1 {
             let text = format!(
                 "`{topic}` is composed to the root of its transforms, in time: {}",
-                way.iter().rev().map(String::as_str).collect::<Vec<_>>().join(" -> ")
+                chain.iter().rev().map(String::as_str).collect::<Vec<_>>().join(" -> ")
             );
             notes.push(Note::information(text));
         }

@@ -54,7 +54,7 @@ fn measured(reading: &BorderReading) -> f64 {
 fn aliasing_is_that_of_drawn_borders() {
     let grid = TapStage::Grid { most: 4 };
     for width_px in [1.0, 1.41, 2.0, 2.5, 3.0, 3.6] {
-        // A single read of so wide a pixel is no way that is ever taken: a path counts up to 1.7 times
+        // A single read of so wide a pixel is never done: a path counts up to 1.7 times
         // there.
         let covers = |taps: &TapStage| width_px <= 3.0 || [grid, TapStage::Area].contains(taps);
         for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Area, grid].into_iter().filter(covers) {

@@ -99,8 +99,8 @@ pub(crate) struct Frequencies4 {
 }
 
 impl Frequencies4 {
-    fn dot(self, way: glam::DVec2) -> Vec4 {
-        way.x as f32 * self.x + way.y as f32 * self.y
+    fn dot(self, direction: glam::DVec2) -> Vec4 {
+        direction.x as f32 * self.x + direction.y as f32 * self.y
     }
 }
 

@@ -4,7 +4,7 @@
 //! picture. Lines find it from farther away: of straight lines s all over an area A, a skyline of length L
 //! whose normal is n crosses `L sum |s.n| / A`. The lines are those from each probe to its neighbours: no ray
 //! is needed to know which of them cross it an odd number of times, and halving finds where some do, and
-//! which way it runs there.
+//! which direction it runs in there.
 
 use std::f64::consts::{PI, TAU};
 
@@ -132,10 +132,10 @@ impl NeighbourhoodSearch<'_> {
     fn point_between(&self, sky_px: DVec2, surface_px: DVec2) -> Option<SkylinePoint> {
         let [sky_px, surface_px] = self.halve(sky_px, surface_px)?;
         let (pose, uv, mid_s) = self.ray_at(surface_px)?;
-        let way_ned = |uv: DVec2| pose.ned_from_camera * uv.extend(1.0);
-        let hit = self.surfaces.first_hit(pose.position_ned_m, way_ned(uv))?;
+        let ray_ned = |uv: DVec2| pose.ned_from_camera * uv.extend(1.0);
+        let hit = self.surfaces.first_hit(pose.position_ned_m, ray_ned(uv))?;
         let light = |uv: DVec2, hit| {
-            self.surfaces.light(pose.position_ned_m, way_ned(uv), hit, uv.extend(1.0).length()).color
+            self.surfaces.light(pose.position_ned_m, ray_ned(uv), hit, uv.extend(1.0).length()).color
         };
         let contrast = light(uv, Some(&hit)) - light(self.reach.camera.unproject(sky_px)?, None);
         let pixel = surface_px.round().max(DVec2::ZERO).to_array().map(|px| px as u32);
@@ -151,7 +151,7 @@ impl NeighbourhoodSearch<'_> {
                 .followed_inverse_depth(surface_px, normal)
                 .unwrap_or(hit.depth_m.recip()),
             normal,
-            ground: hit.terrain.map(|ground| (ground, pose.position_ned_m + hit.depth_m * way_ned(uv))),
+            ground: hit.terrain.map(|ground| (ground, pose.position_ned_m + hit.depth_m * ray_ned(uv))),
             contrast2: (self.gain)(pixel).powi(2) * contrast.length_squared() / 3.0,
             swept_px: self.swept_px([mid_s, exposure_s], uv, hit.depth_m.recip(), normal),
             path_px: path_px(self.path, mid_s, exposure_s, uv, hit.depth_m.recip(), focal_px).0.length(),

@@ -1,10 +1,10 @@
 //! Length of the borders of thin surfaces: what is narrower than the distance of the nine points around a
 //! probe, as trees and window frames are, has two borders where those find one, or none.
 //!
-//! Lines across the picture count without bias: of borders of length L in an area A, whichever way they run,
+//! Lines across the picture count without bias: of borders of length L in an area A, whichever direction they run in,
 //! a line crosses `2 L / (pi A)` for each of its pixels (Crofton). Houses have borders along rows and
 //! columns, which lines along those cross less often: 0.79 times. Every other probe has diagonals, and so the
-//! four ways of line cross whatever runs one way 0.95 to 1.03 times as often as that. Points on them are a
+//! four directions of line cross whatever runs in one direction 0.95 to 1.03 times as often as that. Points on them are a
 //! third of a pixel apart. Two borders within that are still missed; how many there are is estimated by those
 //! that points a pixel apart would have missed.
 
@@ -72,12 +72,12 @@ fn is_another(a: Option<&SurfaceHit>, b: Option<&SurfaceHit>) -> bool {
     }
 }
 
-/// The ways that lines run in: along the row and the column of a probe, and along its diagonals.
+/// The directions that lines run in: along the row and the column of a probe, and along its diagonals.
 const UPRIGHT: [DVec2; 2] = [DVec2::X, DVec2::Y];
 const DIAGONAL: [DVec2; 2] = [DVec2::splat(FRAC_1_SQRT_2), DVec2::new(FRAC_1_SQRT_2, -FRAC_1_SQRT_2)];
 
 impl NeighbourhoodSearch<'_> {
-    /// What two lines through a probe cross, at its own instant; probes take turns in the ways of line by
+    /// What two lines through a probe cross, at its own instant; probes take turns in the directions of line by
     /// their number.
     pub fn line_crossings(&self, number: usize, probe: &Probe) -> LineCrossings {
         let [x, y] = probe.pixel;
