@@ -1,4 +1,4 @@
-"""Files of `benches/scenes`: a picture of the ground as a photograph shows it (ground.jpg), two trees (broadleaf.glb, conifer.glb), flights.
+"""Files of `benches/scenes`: ground as a photograph shows it (ground.jpg), trees (broadleaf.glb, conifer.glb), flights.
 
     python make_scenes.py
 
@@ -36,7 +36,9 @@ def fractal(rng, slope, stretch=1.0):
     fx = np.fft.rfftfreq(WIDTH_PX)[None, :]
     frequency = np.hypot(fx, fy)
     frequency[0, 0] = np.inf
-    noise = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((HEIGHT_PX, WIDTH_PX))) * frequency**-slope, (HEIGHT_PX, WIDTH_PX))
+    noise = np.fft.irfft2(
+        np.fft.rfft2(rng.standard_normal((HEIGHT_PX, WIDTH_PX))) * frequency**-slope, (HEIGHT_PX, WIDTH_PX)
+    )
     return (noise - noise.mean()) / noise.std()
 
 
@@ -56,7 +58,9 @@ def ground_picture(rng):
     def mixed(below, colour, part):
         return below + (np.asarray(colour) - below) * part[..., None]
 
-    picture = mixed(np.full((HEIGHT_PX, WIDTH_PX, 3), (96.0, 112.0, 54.0)), (136, 134, 74), step(wide + 0.5 * tufts, -0.6, 1.6))
+    picture = mixed(
+        np.full((HEIGHT_PX, WIDTH_PX, 3), (96.0, 112.0, 54.0)), (136, 134, 74), step(wide + 0.5 * tufts, -0.6, 1.6)
+    )
     picture = mixed(picture, (58, 82, 36), step(tufts - 0.5 * wide, 0.2, 2.0))
     earth = step(fractal(rng, 1.35) + 0.35 * tufts, 1.25, 1.75)
     trodden = np.abs(y - 14.0 - 5.0 * np.sin(x / 11.0) - 0.25 * x) + 0.5 * tufts
@@ -72,9 +76,15 @@ def ground_picture(rng):
     grass = (1.0 - gravel) * (1.0 - 0.6 * earth)
     shade = 1.0 + 0.05 * wide + 0.10 * tufts + (0.09 + 0.05 * gravel) * fine + 0.11 * grass * blades
     picture *= shade[..., None]
-    for count, colour, sizes in ((2600, (150, 116, 62), (1, 4)), (1300, (224, 222, 206), (1, 3)), (900, (52, 44, 36), (1, 5))):
+    for count, colour, sizes in (
+        (2600, (150, 116, 62), (1, 4)),
+        (1300, (224, 222, 206), (1, 3)),
+        (900, (52, 44, 36), (1, 5)),
+    ):
         for column, row, w, h in zip(
-            rng.integers(0, WIDTH_PX - 5, count), rng.integers(0, HEIGHT_PX - 5, count), *rng.integers(*sizes, (2, count))
+            rng.integers(0, WIDTH_PX - 5, count),
+            rng.integers(0, HEIGHT_PX - 5, count),
+            *rng.integers(*sizes, (2, count)),
         ):
             spot = picture[row : row + h, column : column + w]
             spot += 0.7 * (np.asarray(colour) - spot)
@@ -147,13 +157,15 @@ def broadleaf(rng):
         turn, height = k * math.pi * (3.0 - 5.0**0.5), 1.0 - 2.0 * (k + 0.5) / TUFTS
         out = rng.uniform(0.55, 1.0) ** 0.5
         flat = math.sqrt(1.0 - height**2)
-        place = np.array([2.9 * out * flat * math.cos(turn), 5.9 + 2.7 * out * height, 2.9 * out * flat * math.sin(turn)])
-        place += rng.normal(0.0, 0.2, 3)
+        centre = np.array(
+            [2.9 * out * flat * math.cos(turn), 5.9 + 2.7 * out * height, 2.9 * out * flat * math.sin(turn)]
+        )
+        centre += rng.normal(0.0, 0.2, 3)
         if k % 9 == 0:
-            tree.limb((0.05, 3.0 + 0.3 * place[1], 0.0), place, (0.07, 0.02), 5, bark)
+            tree.limb((0.05, 3.0 + 0.3 * centre[1], 0.0), centre, (0.07, 0.02), 5, bark)
         points, triangles = tuft(rng, rng.uniform(0.5, 0.9))
         light = 0.75 + 0.35 * out * (0.5 + 0.5 * height)
-        tree.surface(points + place, green(rng, (0.075, 0.135, 0.03), light, 12), triangles)
+        tree.surface(points + centre, green(rng, (0.075, 0.135, 0.03), light, 12), triangles)
     return tree
 
 
@@ -170,9 +182,25 @@ def conifer(rng):
             width = 0.18 + 0.2 * reach
             c, s = math.cos(turn), math.sin(turn)
             points = []
-            for out, side, lift in ((0.05, 0, 0.0), (0.5, 1, -0.05), (0.5, 0, 0.14), (0.5, -1, -0.05), (0.8, 0.8, -0.04), (0.8, -0.8, -0.04), (1.0, 0, 0.0)):
+            for out, side, lift in (
+                (0.05, 0, 0.0),
+                (0.5, 1, -0.05),
+                (0.5, 0, 0.14),
+                (0.5, -1, -0.05),
+                (0.8, 0.8, -0.04),
+                (0.8, -0.8, -0.04),
+                (1.0, 0, 0.0),
+            ):
                 r = out * reach
-                points.append(np.array([c * r - s * side * width, base + lift * (0.4 + reach / 3.0) - droop * r * out, s * r + c * side * width]))
+                points.append(
+                    np.array(
+                        [
+                            c * r - s * side * width,
+                            base + lift * (0.4 + reach / 3.0) - droop * r * out,
+                            s * r + c * side * width,
+                        ]
+                    )
+                )
             triangles = [(0, 2, 1), (0, 3, 2), (1, 2, 4), (2, 3, 5), (2, 6, 4), (2, 5, 6), (0, 1, 3), (1, 4, 6)]
             tree.surface(points, green(rng, (0.03, 0.075, 0.03), 0.8 + 0.5 * part, 7), triangles)
     return tree
@@ -212,9 +240,17 @@ class Town:
         self.lat_deg, self.lon_deg, self.north, self.east = centre()
         with (ROOT / "benches" / "houses" / "places.csv").open() as file:
             rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-        self.houses = np.array([
-            ((r["lat_deg"] - self.lat_deg) / self.north, (r["lon_deg"] - self.lon_deg) / self.east, r["heading_deg"], r["scale"]) for r in rows
-        ])
+        self.houses = np.array(
+            [
+                (
+                    (r["lat_deg"] - self.lat_deg) / self.north,
+                    (r["lon_deg"] - self.lon_deg) / self.east,
+                    r["heading_deg"],
+                    r["scale"],
+                )
+                for r in rows
+            ]
+        )
 
     def geodetic_deg(self, north_m, east_m):
         return self.lat_deg + north_m * self.north, self.lon_deg + east_m * self.east
@@ -238,15 +274,23 @@ class Town:
         vn, ve = np.gradient(north, step_s), np.gradient(east, step_s)
         yaw = np.unwrap(np.arctan2(ve, vn))
         bank = np.arctan(np.hypot(vn, ve) * np.gradient(yaw, step_s) / G)
-        ground = np.array([self.ground_m(north + n, east + e) for n, e in ((0, 0), (8, 0), (-8, 0), (0, 8), (0, -8))]).max(axis=0)
+        ground = np.array(
+            [self.ground_m(north + n, east + e) for n, e in ((0, 0), (8, 0), (-8, 0), (0, 8), (0, -8))]
+        ).max(axis=0)
         kernel = np.hanning(101) / np.hanning(101).sum()
         height = np.convolve(np.pad(ground, 50, mode="edge"), kernel, mode="valid") + above_m
-        print(f"{name}: {np.min(height - ground):.1f} to {np.max(height - self.ground_m(north, east)):.1f} m above ground,"
-              f" {self.clearance_m(north, east).min():.1f} m from a wall on the map, bank {np.degrees(np.abs(bank).max()):.0f} deg")
+        low, high = np.min(height - ground), np.max(height - self.ground_m(north, east))
+        print(
+            f"{name}: {low:.1f} to {high:.1f} m above ground,"
+            f" {self.clearance_m(north, east).min():.1f} m from a wall on the map,"
+            f" bank {np.degrees(np.abs(bank).max()):.0f} deg"
+        )
         lat, lon = self.geodetic_deg(north, east)
         roll = np.degrees(bank) + sway(t, (noise, 0.7, 0.0), (0.6 * noise, 0.31, 0.3))
         pitch = lean + sway(t, (noise, 0.9, 0.2), (0.5 * noise, 0.37, 0.6))
-        write_flight(name, "lat_deg,lon_deg,height_m", zip(t, lat, lon, height, roll, pitch, np.degrees(yaw)), (8, 8, 3))
+        write_flight(
+            name, "lat_deg,lon_deg,height_m", zip(t, lat, lon, height, roll, pitch, np.degrees(yaw)), (8, 8, 3)
+        )
 
 
 def town_flights(town):
@@ -268,7 +312,12 @@ def mapping_flight(town):
     print(f"mapping.csv: {np.min(height - below):.0f} to {np.max(height - below):.0f} m above ground")
     roll, pitch = sway(t, (1.5, 4.3, 0.0), (0.8, 1.7, 0.4)), sway(t, (1.5, 3.9, 0.2), (0.8, 1.9, 0.7))
     yaw = LINE[2] + sway(t, (2.0, 11.0, 0.3))
-    write_flight("mapping.csv", "lat_deg,lon_deg,height_m", zip(t, *town.geodetic_deg(north, east), height, roll, pitch, yaw), (8, 8, 3))
+    write_flight(
+        "mapping.csv",
+        "lat_deg,lon_deg,height_m",
+        zip(t, *town.geodetic_deg(north, east), height, roll, pitch, yaw),
+        (8, 8, 3),
+    )
 
 
 if __name__ == "__main__":

@@ -17,7 +17,9 @@ from PIL import Image
 WORK, PICTURES = map(pathlib.Path, sys.argv[1:3])
 # At 800 pixels a letter is 11 pixels high.
 WIDTH = 8.0
-plt.rcParams.update({"font.size": 11, "axes.titlesize": 11, "figure.constrained_layout.use": True, "image.interpolation": "antialiased"})
+plt.rcParams.update(
+    {"font.size": 11, "axes.titlesize": 11, "figure.constrained_layout.use": True, "image.interpolation": "antialiased"}
+)
 
 
 def picture(path):
@@ -94,7 +96,15 @@ def board():
         x, y = float(row["x_px"]), float(row["y_px"])
         if west + 3 < x < east - 12 and north + 6 < y < south - 3:
             right.plot(x, y, "+", color="tab:red", markersize=9, markeredgewidth=1.2)
-            right.annotate(row["point"], (x, y), (3, 3), textcoords="offset points", color="tab:red", fontsize=10, bbox={"facecolor": "white", "alpha": 0.8, "pad": 0.5, "linewidth": 0})
+            right.annotate(
+                row["point"],
+                (x, y),
+                (3, 3),
+                textcoords="offset points",
+                color="tab:red",
+                fontsize=10,
+                bbox={"facecolor": "white", "alpha": 0.8, "pad": 0.5, "linewidth": 0},
+            )
     right.set(xlim=(west, east), ylim=(south, north))
     right.set_title("its exact corners, by their ids")
     save(figure, "boards")
@@ -130,9 +140,13 @@ def channels():
 def export():
     figure = plt.figure(figsize=(WIDTH, 3.6))
     left, right = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d", computed_zorder=False)
-    lines = [line.split() for line in (WORK / "colmap/sparse_text/0/points3D.txt").read_text().splitlines() if line[0] != "#"]
+    lines = [
+        line.split() for line in (WORK / "colmap/sparse_text/0/points3D.txt").read_text().splitlines() if line[0] != "#"
+    ]
     points = {int(line[0]): np.array(line[1:7], float) for line in lines}
-    images = [line for line in (WORK / "colmap/sparse_text/0/images.txt").read_text().splitlines() if not line.startswith("#")]
+    images = [
+        line for line in (WORK / "colmap/sparse_text/0/images.txt").read_text().splitlines() if not line.startswith("#")
+    ]
     poses, seen = images[::2], np.array(images[1::2][2].split(), float).reshape(-1, 3)
     name = poses[2].split()[9]
     left.imshow(picture(f"colmap/images/{name}"))
@@ -196,11 +210,31 @@ def label(axis, box, text, taken):
     west, north, east, south = box
     width, height = 9.4 * len(text) + 6, 20
     x, y = (west + east) / 2, (north + south) / 2
-    for left, top in ((x - width / 2, north - height - 2), (east + 3, y - height / 2), (west - width - 3, y - height / 2), (x - width / 2, south + 2)):
+    for left, top in (
+        (x - width / 2, north - height - 2),
+        (east + 3, y - height / 2),
+        (west - width - 3, y - height / 2),
+        (x - width / 2, south + 2),
+    ):
         right, bottom = left + width, top + height
-        is_inside = axis.get_xlim()[0] < left and right < axis.get_xlim()[1] and axis.get_ylim()[1] < top and bottom < axis.get_ylim()[0]
-        if is_inside and all(right < other[0] or other[2] < left or bottom < other[1] or other[3] < top for other in taken):
-            axis.text((left + right) / 2, (top + bottom) / 2, text, ha="center", va="center", fontsize=10, bbox={"facecolor": "white", "alpha": 0.75, "pad": 1, "linewidth": 0})
+        is_inside = (
+            axis.get_xlim()[0] < left
+            and right < axis.get_xlim()[1]
+            and axis.get_ylim()[1] < top
+            and bottom < axis.get_ylim()[0]
+        )
+        if is_inside and all(
+            right < other[0] or other[2] < left or bottom < other[1] or other[3] < top for other in taken
+        ):
+            axis.text(
+                (left + right) / 2,
+                (top + bottom) / 2,
+                text,
+                ha="center",
+                va="center",
+                fontsize=10,
+                bbox={"facecolor": "white", "alpha": 0.75, "pad": 1, "linewidth": 0},
+            )
             taken.append((left, top, right, bottom))
             return
 
@@ -222,10 +256,21 @@ def objects():
         axis.set(xlim=(20, 560), ylim=(345, 0))
         taken = list(boxes.values())
         # Vehicles first, then the large.
-        for (number, name, is_vehicle), box in sorted(boxes.items(), key=lambda item: (not item[0][2], item[1][1] - item[1][3])):
+        for (number, name, is_vehicle), box in sorted(
+            boxes.items(), key=lambda item: (not item[0][2], item[1][1] - item[1][3])
+        ):
             if axis is left:
                 west, north, east, south = box
-                axis.add_patch(plt.Rectangle((west, north), east - west, south - north, fill=False, color="yellow" if is_vehicle else "white", linewidth=1.2))
+                axis.add_patch(
+                    plt.Rectangle(
+                        (west, north),
+                        east - west,
+                        south - north,
+                        fill=False,
+                        color="yellow" if is_vehicle else "white",
+                        linewidth=1.2,
+                    )
+                )
             label(axis, box, name if axis is left else number, taken)
     save(figure, "objects")
 
@@ -239,7 +284,9 @@ def python():
     flow = planes("python/flow/frame_000032.exr")
     right.imshow(np.hypot(flow["dx"], flow["dy"]), cmap="magma", vmin=0)
     y, x = np.mgrid[24:480:48, 24:640:48]
-    right.quiver(x, y, flow["dx"][y, x], flow["dy"][y, x], angles="xy", scale_units="xy", scale=0.25, color="white", width=0.008)
+    right.quiver(
+        x, y, flow["dx"][y, x], flow["dy"][y, x], angles="xy", scale_units="xy", scale=0.25, color="white", width=0.008
+    )
     right.set_title("frame.flow")
     save(figure, "python")
 
@@ -253,7 +300,8 @@ def randomize():
         focal = json.loads(row["camera.focal_px"])[0]
         light, noise = float(row["camera.photometric.light"]), float(row["camera.photometric.noise_sigma"])
         exposure = float(row["camera.shutter.exposure_ms"])
-        axis.set_title(f"f {focal:.0f} px, {exposure:.1f} ms\nlight {light:.2f}, noise {noise:.3f}\n{json.loads(row['camera.lens'])['model']}")
+        lens = json.loads(row["camera.lens"])["model"]
+        axis.set_title(f"f {focal:.0f} px, {exposure:.1f} ms\nlight {light:.2f}, noise {noise:.3f}\n{lens}")
     save(figure, "randomize")
 
 
@@ -267,7 +315,13 @@ def rigs():
     figure, axis = panels(1, WIDTH, 5.4)
     for name, place in places.items():
         sheet.paste(frames[name], place)
-        axis.text(place[0] + 8, place[1] + 10, f"{name}: {angles[name]}", va="top", bbox={"facecolor": "white", "alpha": 0.8, "pad": 2, "linewidth": 0})
+        axis.text(
+            place[0] + 8,
+            place[1] + 10,
+            f"{name}: {angles[name]}",
+            va="top",
+            bbox={"facecolor": "white", "alpha": 0.8, "pad": 2, "linewidth": 0},
+        )
         axis.add_patch(plt.Rectangle(place, size, size, fill=False, color="white", linewidth=1))
     axis.imshow(sheet)
     save(figure, "rigs")
@@ -326,9 +380,24 @@ def tracks():
     right.set_title("the part in the white frame")
     for colour, label in (("yellow", "visible"), ("cyan", "on what moves"), ("red", "hidden")):
         right.plot([], [], color=colour, linewidth=2, label=label)
-    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=3, facecolor="0.4", labelcolor="white")
+    figure.legend(
+        *right.get_legend_handles_labels(), loc="outside lower center", ncols=3, facecolor="0.4", labelcolor="white"
+    )
     save(figure, "tracks")
 
 
-for draw in (apply, board, camera_files, channels, export, long_runs, objects, python, randomize, rigs, sensors, tracks):
+for draw in (
+    apply,
+    board,
+    camera_files,
+    channels,
+    export,
+    long_runs,
+    objects,
+    python,
+    randomize,
+    rigs,
+    sensors,
+    tracks,
+):
     draw()

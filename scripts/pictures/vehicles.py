@@ -50,13 +50,17 @@ def write(name, paint, parts):
         ],
         "accessors": accessors,
         "bufferViews": views,
-        "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}],
+        "buffers": [
+            {"byteLength": len(data), "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}
+        ],
     }
     (FOLDER / f"{name}.gltf").write_text(json.dumps(model))
 
 
 def wheels(half_width, *along):
-    return [("rubber", (x - 0.15, 0.0, z - 0.4), (x + 0.15, 0.8, z + 0.4)) for x in (-half_width, half_width) for z in along]
+    return [
+        ("rubber", (x - 0.15, 0.0, z - 0.4), (x + 0.15, 0.8, z + 0.4)) for x in (-half_width, half_width) for z in along
+    ]
 
 
 write(
