@@ -27,8 +27,8 @@ pub fn bends([a, b, c]: [f64; 3], fraction: f64) -> bool {
     (a - 2.0 * b + c).abs() > fraction * a.max(b).max(c)
 }
 
-/// Whether there is a step between two rays with the given inverse depths (0 for the sky). `between` returns
-/// the inverse depth of the ray at a fraction of the path.
+/// Whether there is a step between two rays with the given inverse depths (0 for the sky). `between(fraction)`
+/// returns the inverse depth of the ray so far from the first (0) to the second (1).
 pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
     let differ = |a: f64, b: f64| (a - b).abs() > STEP * a.max(b);
     let (mut before, mut after) = ((0.0, from), (1.0, to));

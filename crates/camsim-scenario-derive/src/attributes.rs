@@ -2,7 +2,7 @@
 
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
-use syn::{Attribute, Expr, ExprLit, Lit, LitStr, Meta, Result, meta::ParseNestedMeta};
+use syn::{Attribute, Expr, ExprLit, Lit, LitStr, Meta, Result, meta::ParseNestedMeta, parse_quote};
 
 /// The text of a doc comment, its lines joined; paragraphs after the first are left out.
 pub fn doc(attributes: &[Attribute]) -> String {
@@ -111,6 +111,10 @@ impl Key {
                 "above" => key.low = end(quote!(Open), value),
                 "max" => key.high = end(quote!(Closed), value),
                 "below" => key.high = end(quote!(Open), value),
+                "within" => {
+                    key.low = end(quote!(Closed), parse_quote!(-#value));
+                    key.high = end(quote!(Closed), value);
+                }
                 "only" => {
                     let Expr::Array(list) = value else { return Err(part.error("`only` is a list")) };
                     key.only = list.elems.into_iter().collect();

@@ -12,7 +12,8 @@ mod words;
 ///
 /// `#[key(...)]` on a field states, each where it applies: `required`, `default = EXPRESSION`, `unit = "px"`,
 /// `step = 0.5` (change per point of drag), `min` or `above` and `max` or `below` (legal interval of every number
-/// in it), `hint = "..."` (advice where a number is outside), `example = "..."` (TOML, where the key is absent by
+/// in it), `within = 360.0` (as `min = -360.0, max = 360.0`), `only = [8, 10]` (the legal numbers, in ascending
+/// order), `hint = "..."` (advice where a number is outside), `example = "..."` (TOML, where the key is absent by
 /// default) and `names = "fx fy"` (of the elements of a list). The doc comment is the description. Fields with
 /// `#[serde(skip)]` are no keys.
 #[proc_macro_derive(Table, attributes(key, serde))]

@@ -59,13 +59,7 @@ pub struct CameraSpec {
     pub phase: f64,
     /// Lead of the camera's clock over the platform's. It is added to every stamp that the camera writes;
     /// poses stay those of the true instants.
-    #[key(
-        unit = "ms",
-        step = 0.1,
-        min = -MAX_CLOCK_OFFSET_MS,
-        max = MAX_CLOCK_OFFSET_MS,
-        hint = "it is how much the camera's clock is ahead"
-    )]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
     #[serde(skip_serializing_if = "crate::is_default")]
     pub clock_offset_ms: f64,
     /// Position and orientation on the platform.

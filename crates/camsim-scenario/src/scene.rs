@@ -66,14 +66,7 @@ pub struct SceneSpec {
 #[serde(default, deny_unknown_fields)]
 pub struct LightSpec {
     /// Azimuth of the sun, east of north.
-    #[key(
-        default = 180.0,
-        unit = "deg",
-        step = 0.5,
-        min = -360.0,
-        max = 360.0,
-        hint = "it counts from north to east"
-    )]
+    #[key(default = 180.0, unit = "deg", step = 0.5, within = 360.0, hint = "it counts from north to east")]
     pub sun_azimuth_deg: f64,
     /// Elevation of the sun above the horizon.
     #[key(

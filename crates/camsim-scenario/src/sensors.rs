@@ -101,13 +101,7 @@ pub struct GnssSpec {
     #[key(unit = "ms", min = 0.0, hint = "it is the age of a fix when it arrives")]
     pub delay_ms: f64,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(
-        unit = "ms",
-        step = 0.1,
-        min = -MAX_CLOCK_OFFSET_MS,
-        max = MAX_CLOCK_OFFSET_MS,
-        hint = "it is how much the sensor's clock is ahead"
-    )]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
@@ -154,13 +148,7 @@ pub struct BarometerSpec {
     #[key(unit = "Pa", step = 0.1, min = 0.0, hint = "0 is none")]
     pub quantisation_pa: f64,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(
-        unit = "ms",
-        step = 0.1,
-        min = -MAX_CLOCK_OFFSET_MS,
-        max = MAX_CLOCK_OFFSET_MS,
-        hint = "it is how much the sensor's clock is ahead"
-    )]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
@@ -209,13 +197,7 @@ pub struct MagnetometerSpec {
     #[key(unit = "uT", min = 0.0, hint = "0 is no limit")]
     pub range_ut: f64,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(
-        unit = "ms",
-        step = 0.1,
-        min = -MAX_CLOCK_OFFSET_MS,
-        max = MAX_CLOCK_OFFSET_MS,
-        hint = "it is how much the sensor's clock is ahead"
-    )]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]

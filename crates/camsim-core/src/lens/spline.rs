@@ -72,8 +72,8 @@ impl Spline {
     }
 }
 
-/// Weights of four neighbouring coefficients and their derivatives, at a fraction of the interval from the second to the
-/// third.
+/// Weights of four neighbouring coefficients and their derivatives, at a fraction of the interval from the
+/// second to the third.
 fn weights(t: f64) -> ([f64; 4], [f64; 4]) {
     let (t2, s) = (t * t, 1.0 - t);
     let t3 = t2 * t;

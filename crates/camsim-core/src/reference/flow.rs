@@ -1,9 +1,9 @@
 //! Flow, motion and blur path of the oracle: where another picture shows what a pixel sees, by a search over
 //! the instants of that picture's rows.
 //!
-//! The equation `position = project(camera(t(position)), point(t(position)))` along the readout is looked at in steps of
-//! half a pixel, from border to border. Each change of sign is closed in on by bisection, and each turn near zero by
-//! thirds, as two solutions may be beside it.
+//! The equation `position = project(camera(t(position)), point(t(position)))` along the readout is looked at in
+//! steps of half a pixel, from border to border. Each change of sign is closed in on by bisection, and each
+//! turn near zero by thirds, as two solutions may be beside it.
 
 use glam::{DVec2, DVec3};
 

@@ -193,8 +193,8 @@ impl<'a> Job<'a> {
         Self { caster, plan, line, instants, spheres }
     }
 
-    /// Mean light over the area and exposure of a pixel, whose position along the row is stated; `None` if no lamp comes
-    /// near.
+    /// Mean light over the area and exposure of a pixel, whose position along the row is stated; `None` if no
+    /// lamp comes near.
     fn light(&self, along: u32, pixel: [u32; 2], scratch: &mut RayScratch) -> Option<Vec3> {
         let camera = &self.plan.camera;
         let uv = camera.unproject(DVec2::from_array(pixel.map(f64::from)))?;
@@ -295,7 +295,8 @@ fn room_px(plan: &FramePlan) -> f64 {
     IDEAL_ROOM_PX / plan.ideal.scale(&plan.camera).max(LEAST_SCALE)
 }
 
-/// What the positions of an instant are shifted by, so that a lamp's steps from instant to instant do not beat with them.
+/// What the positions of an instant are shifted by, so that a lamp's steps from instant to instant do not beat
+/// with them.
 fn shift(instant: usize) -> DVec2 {
     let [x, y, ..] = pcg4d([instant as u32, 0, 0, 0]);
     DVec2::new(f64::from(x >> 8), f64::from(y >> 8)) / 2.0_f64.powi(24)

@@ -70,8 +70,8 @@ pub(super) fn notes(
     far.into_iter().chain(coarse).collect()
 }
 
-/// Whether vertices lie as far from their origin as positions on the ground from the Earth's centre, NED. Coordinates of
-/// a map grid may have that length too, but are low.
+/// Whether vertices lie as far from their origin as positions on the ground from the Earth's centre, NED.
+/// Coordinates of a map grid may have that length too, but are low.
 fn is_earth_centred(from_origin: DVec3) -> bool {
     EARTH_RADII_M.contains(&from_origin.length()) && from_origin.z.abs() > HIGHEST_M
 }

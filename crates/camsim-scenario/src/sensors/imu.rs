@@ -48,13 +48,7 @@ pub struct ImuSpec {
     #[key(unit = "(rad/s)/(m/s2)", step = 1e-6)]
     pub g_sensitivity: PerAxis,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(
-        unit = "ms",
-        step = 0.1,
-        min = -MAX_CLOCK_OFFSET_MS,
-        max = MAX_CLOCK_OFFSET_MS,
-        hint = "it is how much the sensor's clock is ahead"
-    )]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]

@@ -58,8 +58,8 @@ impl Grid {
     }
 }
 
-/// The cell of a position along a side, and the fraction of it, NaN outside. Without a conversion that saturates, so that
-/// it becomes vector instructions.
+/// The cell of a position along a side, and the fraction of it, NaN outside. Without a conversion that
+/// saturates, so that it becomes vector instructions.
 #[inline(always)]
 fn cell(position: f64) -> (u64, f64) {
     /// Added to a small number, it leaves the nearest integer in the lowest bits.

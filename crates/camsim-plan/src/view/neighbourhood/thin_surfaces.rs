@@ -1,12 +1,12 @@
 //! Length of the borders of thin surfaces: what is narrower than the distance of the nine points around a
 //! probe, as trees and window frames are, has two borders where those find one, or none.
 //!
-//! Lines across the picture count without bias: of borders of length L in an area A, whichever direction they run in,
-//! a line crosses `2 L / (pi A)` for each of its pixels (Crofton). Houses have borders along rows and
+//! Lines across the picture count without bias: of borders of length L in an area A, whichever direction they
+//! run in, a line crosses `2 L / (pi A)` for each of its pixels (Crofton). Houses have borders along rows and
 //! columns, which lines along those cross less often: 0.79 times. Every other probe has diagonals, and so the
-//! four directions of line cross whatever runs in one direction 0.95 to 1.03 times as often as that. Points on them are a
-//! third of a pixel apart. Two borders within that are still missed; how many there are is estimated by those
-//! that points a pixel apart would have missed.
+//! four directions of line cross whatever runs in one direction 0.95 to 1.03 times as often as that. Points on
+//! them are a third of a pixel apart. Two borders within that are still missed; how many there are is estimated
+//! by those that points a pixel apart would have missed.
 
 use std::{
     cell::OnceCell,
