@@ -12,6 +12,7 @@ use super::{
 
 /// Largest offset of a camera's or sensor's clock, 127 years: stamps of this century stay within 64 bits.
 pub(crate) const MAX_CLOCK_OFFSET_MS: f64 = 4e12;
+pub(crate) const CLOCK_HINT: &str = "it is how much this clock is ahead";
 
 /// The camera: geometry, lens, shutter and photometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
@@ -59,7 +60,7 @@ pub struct CameraSpec {
     pub phase: f64,
     /// Lead of the camera's clock over the platform's. It is added to every stamp that the camera writes;
     /// poses stay those of the true instants.
-    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS, hint = CLOCK_HINT)]
     #[serde(skip_serializing_if = "crate::is_default")]
     pub clock_offset_ms: f64,
     /// Position and orientation on the platform.

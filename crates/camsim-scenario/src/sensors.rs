@@ -10,7 +10,7 @@ pub use per_axis::PerAxis;
 
 use super::{
     Scenario,
-    camera::MAX_CLOCK_OFFSET_MS,
+    camera::{CLOCK_HINT, MAX_CLOCK_OFFSET_MS},
     keys::{Table, Words},
 };
 
@@ -101,7 +101,7 @@ pub struct GnssSpec {
     #[key(unit = "ms", min = 0.0, hint = "it is the age of a fix when it arrives")]
     pub delay_ms: f64,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS, hint = CLOCK_HINT)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
@@ -148,7 +148,7 @@ pub struct BarometerSpec {
     #[key(unit = "Pa", step = 0.1, min = 0.0, hint = "0 is none")]
     pub quantisation_pa: f64,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS, hint = CLOCK_HINT)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
@@ -197,7 +197,7 @@ pub struct MagnetometerSpec {
     #[key(unit = "uT", min = 0.0, hint = "0 is no limit")]
     pub range_ut: f64,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS, hint = CLOCK_HINT)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{MAX_RATE_HZ, PerAxis, SensorAxes, SensorMountSpec};
 use crate::{
-    camera::MAX_CLOCK_OFFSET_MS,
+    camera::{CLOCK_HINT, MAX_CLOCK_OFFSET_MS},
     keys::{Table, Words},
 };
 
@@ -48,7 +48,7 @@ pub struct ImuSpec {
     #[key(unit = "(rad/s)/(m/s2)", step = 1e-6)]
     pub g_sensitivity: PerAxis,
     /// Lead of the sensor's clock, which is added to every stamp.
-    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS)]
+    #[key(unit = "ms", step = 0.1, within = MAX_CLOCK_OFFSET_MS, hint = CLOCK_HINT)]
     pub clock_offset_ms: f64,
     /// Standard deviation of a random error of every stamp.
     #[key(unit = "ms", step = 0.01, min = 0.0, hint = "0 is none")]
