@@ -75,7 +75,7 @@ pub(crate) struct RasterScene {
 /// Meshes of one shape and material.
 #[derive(Debug)]
 struct MeshModel {
-    /// Pieces by level of detail.
+    /// Pieces by level of detail, up to the coarsest that was drawn.
     levels: Vec<Vec<Piece>>,
     one_sided: bool,
     light: Option<Light>,
@@ -133,7 +133,7 @@ impl RasterScene {
         materials
             .extend(batches.batches.iter().map(|batch| material(batch, textures.triangles_of_piece(batch))));
         let mesh_model = |batch: &Batch| MeshModel {
-            levels: Piece::of_levels(&batch.shape, &batch.levels),
+            levels: Vec::new(),
             one_sided: batch.material.one_sided,
             light: batch.light,
         };
@@ -160,6 +160,7 @@ impl RasterScene {
             sample_offset: 0,
         };
         let (in_view, level_instances) = view.batches.in_view(&key.pose, view.tolerance);
+        self.make_pieces(view.batches, &level_instances);
         let mut parts = terrain_parts(view.terrain);
         self.add_parts(&level_instances, &mut parts);
         let chunk_parts = chunk_parts(parts);
@@ -226,6 +227,15 @@ impl RasterScene {
         };
         multisample.fill(&shader, &mut self.visible, into);
         self.multisample = multisample;
+    }
+
+    /// Makes the pieces of levels of detail that are drawn for the first time.
+    fn make_pieces(&mut self, batches: &SceneBatches, level_instances: &[Vec<Range<u32>>]) {
+        let meshes = self.meshes.par_iter_mut().zip(&batches.batches).zip(level_instances);
+        meshes.for_each(|((mesh_model, Batch { shape, levels, .. }), level_instances)| {
+            let made = mesh_model.levels.len()..level_instances.len();
+            mesh_model.levels.extend(made.map(|level| Piece::of_level(shape, levels.indices(level))));
+        });
     }
 
     fn add_parts(&self, level_instances: &[Vec<Range<u32>>], parts: &mut Vec<(DrawPart, usize)>) {

@@ -228,7 +228,7 @@ impl DrawPass {
         recorder: &mut Recorder<'_>,
         slots: &mut [DrawSlot],
         scene: &Scene,
-        buffers: &SceneBuffers,
+        buffers: &mut SceneBuffers,
         plan: &FramePlan,
         meshes: &[PlacedMesh],
         tolerance: &LodTolerance,
@@ -301,7 +301,7 @@ impl DrawPass {
         recorder: &mut Recorder<'_>,
         slots: &mut [DrawSlot],
         scene: &Scene,
-        buffers: &SceneBuffers,
+        buffers: &mut SceneBuffers,
         plan: &FramePlan,
         meshes: &[PlacedMesh],
         tolerance: &LodTolerance,
@@ -320,7 +320,8 @@ impl DrawPass {
                 terrain.bind(gpu, recorder, &self.terrain_layout, terrain_buffers, &buffers.sampler);
             }
             index_counts.push(indices);
-            let meshes_in_view = upload_placements(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
+            let meshes_in_view =
+                upload_placements(gpu, recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
             if let Some(blended) = &mut slot.blended {
                 let instances = &slot.level_instances;
                 let tangents = tolerance.tangents;

@@ -303,7 +303,7 @@ impl GpuSession<'_> {
             recorder,
             ideal_slots,
             job.scene,
-            &self.buffers,
+            &mut self.buffers,
             plan,
             job.terrain,
             job.models,

@@ -49,10 +49,8 @@ pub enum TerrainTexture {
 pub struct MeshBatch {
     /// Positions, texture coordinates and tints.
     pub vertices: wgpu::Buffer,
-    /// Triangle lists of all levels of detail.
-    pub indices: wgpu::Buffer,
-    /// Range of each level of detail in `indices`, the full shape first.
-    pub ranges: Vec<Range<u32>>,
+    /// Triangle lists by level of detail, up to the coarsest that was drawn.
+    pub indices: Vec<wgpu::Buffer>,
     /// Sampler with the wrap modes of the material.
     pub sampler: wgpu::Sampler,
     /// Normals, if the mesh is illuminated.
@@ -101,6 +99,19 @@ impl SceneBuffers {
             check_texture(gpu, &batch.material.texture, "the texture of a mesh or pattern")
         })?;
         Ok(Self { terrain, meshes, batches, textures: Vec::new(), sampler })
+    }
+
+    /// Uploads the levels of detail that are drawn for the first time. `level_instances` has as many ranges for
+    /// a batch as levels up to the coarsest that is drawn.
+    pub fn upload_levels(&mut self, gpu: &GpuContext, level_instances: &[Vec<Range<u32>>]) {
+        let batches = self.batches.iter_mut().zip(&self.meshes.batches).zip(level_instances);
+        for ((uploaded, Batch { levels, .. }), level_instances) in batches {
+            let new = uploaded.indices.len()..level_instances.len();
+            uploaded.indices.extend(new.map(|level| {
+                let indices = bytemuck::cast_slice(levels.indices(level));
+                upload_buffer(gpu, "camsim.mesh.indices", indices, wgpu::BufferUsages::INDEX)
+            }));
+        }
     }
 
     /// Uploads the textures of the scene, unless already done: as long as the CPU draws all ideal frames the
@@ -170,40 +181,19 @@ fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers,
 }
 
 fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
-    let Batch { shape, levels, material, light, .. } = batch;
+    let Batch { shape, material, light, .. } = batch;
     let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();
-    let (mut indices, mut ranges) = (Vec::<u32>::new(), Vec::new());
-    for level in levels.levels() {
-        let first = indices.len() as u32;
-        indices.extend(&level.indices);
-        ranges.push(first..indices.len() as u32);
-    }
     let [r, g, b] = material.emissive;
     let sun_sky =
         light.map_or([0.0; 4], |light| (light.sun * light.to_sun_ned).extend(light.sky).as_vec4().to_array());
     let uniform = MeshMaterial { emissive_cutoff: [r, g, b, material.cutoff.unwrap_or(0.0)], sun_sky };
-    let buffer = |label, contents: &[u8], usage| {
-        let size = contents.len() as u64;
-        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: true,
-        });
-        // A lost device cannot be written to; it reports that itself.
-        if let Ok(mut range) = buffer.get_mapped_range_mut(..) {
-            range.copy_from_slice(contents);
-        }
-        buffer.unmap();
-        buffer
-    };
+    let buffer = |label, contents: &[u8], usage| upload_buffer(gpu, label, contents, usage);
     MeshBatch {
         vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
-        indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+        indices: Vec::new(),
         normals: light.map(|_| {
             buffer("camsim.mesh.normals", bytemuck::cast_slice(&shape.normals), wgpu::BufferUsages::VERTEX)
         }),
-        ranges,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
         kind: MeshKind {
@@ -213,6 +203,22 @@ fn upload_batch(gpu: &GpuContext, batch: &Batch) -> MeshBatch {
             blends: material.blends,
         },
     }
+}
+
+fn upload_buffer(gpu: &GpuContext, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    let size = contents.len() as u64;
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size,
+        usage,
+        mapped_at_creation: true,
+    });
+    // A lost device cannot be written to; it reports that itself.
+    if let Ok(mut range) = buffer.get_mapped_range_mut(..) {
+        range.copy_from_slice(contents);
+    }
+    buffer.unmap();
+    buffer
 }
 
 /// Checks that a texture fits the adapter.

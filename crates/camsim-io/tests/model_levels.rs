@@ -81,7 +81,7 @@ fn levels_of_published_models_are_within_their_errors() {
             for mesh in
                 model.place(DVec3::ZERO, 0.0, 1.0).filter(|mesh| visited.insert(Arc::as_ptr(&mesh.shape)))
             {
-                let levels = ShapeLods::new(&mesh.shape);
+                let levels = ShapeLods::new(mesh.shape.clone());
                 let full = triangles(&mesh.shape, &levels.levels()[0].indices);
                 for level in &levels.levels()[1..] {
                     let simplified = triangles(&mesh.shape, &level.indices);

@@ -46,7 +46,11 @@ fn models_are_placed_at_their_positions_and_headings() {
         origins,
         [DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, -1.0), DVec3::new(30.0, 40.0, -2.0)]
     );
-    assert!(Arc::ptr_eq(&meshes[1].shape, &meshes[2].shape), "copies share their shape");
+    let first = &meshes[0];
+    for mesh in &meshes {
+        assert!(Arc::ptr_eq(&mesh.shape, &first.shape), "copies of all entries share their shape");
+        assert!(mesh.material.is_same_as(&first.material), "and their texture");
+    }
     // A vertex half a metre to the left of a model that faces east lies north of it, at scale 2 x 3.
     assert!(
         meshes[1].position_ned_m(1).distance(DVec3::new(13.0, 20.0, -1.0)) < 1e-9,

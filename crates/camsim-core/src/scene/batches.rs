@@ -3,6 +3,7 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::{
     Aabb, Light, LodTolerance, Material, Mesh, Scene, SceneLods, Shape, ShapeLods, in_view,
@@ -85,46 +86,32 @@ impl SceneBatches {
     }
 
     /// Indices into [`SceneBatches::placed`] of the meshes that may be in view, those of one batch and level
-    /// of detail side by side; and for each batch and level its range of that list.
+    /// of detail side by side; and for each batch its range of that list by level, up to the coarsest of them.
     #[must_use]
     pub fn in_view(&self, pose: &CameraPose, tolerance: &LodTolerance) -> (Vec<u32>, Vec<Vec<Range<u32>>>) {
-        let mut visible = in_view(&self.bounds, pose, tolerance.tangents);
-        let position = |visible: &[u32], member: u32| visible.partition_point(|&i| i < member);
-        let ranges: Vec<_> = self
-            .batches
-            .iter()
-            .map(|batch| position(&visible, batch.members.start)..position(&visible, batch.members.end))
-            .collect();
-        let by_level = self
-            .batches
-            .iter()
-            .zip(ranges)
-            .map(|(batch, range)| {
-                self.sort_by_level(batch, &mut visible[range.clone()], range.start, pose, tolerance)
-            })
-            .collect();
-        (visible, by_level)
-    }
-
-    /// Sorts the visible meshes of a batch by level of detail; gives the range of each level.
-    fn sort_by_level(
-        &self,
-        batch: &Batch,
-        visible: &mut [u32],
-        first: usize,
-        pose: &CameraPose,
-        tolerance: &LodTolerance,
-    ) -> Vec<Range<u32>> {
-        let count = batch.levels.levels().len();
-        let level = |&i: &u32| match count {
-            0 | 1 => 0,
-            _ => batch.levels.coarsest_within(
-                tolerance.error_m(&self.bounds[i as usize], pose) / self.placed[i as usize].stretch,
-            ),
-        };
-        visible.sort_by_cached_key(level);
-        let levels: Vec<usize> = visible.iter().map(level).collect();
-        let position = |level: usize| (first + levels.partition_point(|&other| other < level)) as u32;
-        (0..count).map(|level| position(level)..position(level + 1)).collect()
+        let visible = in_view(&self.bounds, pose, tolerance.tangents);
+        let position = |member: u32| visible.partition_point(|&i| i < member);
+        let error_m =
+            |i: u32| tolerance.error_m(&self.bounds[i as usize], pose) / self.placed[i as usize].stretch;
+        // In parallel, since shapes are simplified when a coarser level may first be drawn.
+        let by_level = self.batches.par_iter().map(|Batch { levels, members, .. }| {
+            let visible = &visible[position(members.start)..position(members.end)];
+            let mut by_level: Vec<_> =
+                visible.iter().map(|&i| (levels.coarsest_within(error_m(i)), i)).collect();
+            by_level.sort_unstable();
+            by_level
+        });
+        let by_level: Vec<Vec<(usize, u32)>> = by_level.collect();
+        let mut first = 0;
+        let ranges = by_level.iter().map(|of_batch| {
+            let position =
+                |level: usize| (first + of_batch.partition_point(|&(other, _)| other < level)) as u32;
+            let count = of_batch.last().map_or(0, |(coarsest, _)| coarsest + 1);
+            let ranges = (0..count).map(|level| position(level)..position(level + 1)).collect();
+            first += of_batch.len();
+            ranges
+        });
+        let ranges = ranges.collect();
+        (by_level.into_iter().flatten().map(|(_, i)| i).collect(), ranges)
     }
 }

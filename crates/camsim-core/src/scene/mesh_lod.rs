@@ -6,7 +6,7 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use glam::{DMat3, DVec3};
@@ -20,6 +20,7 @@ mod attribute_space;
 mod hausdorff;
 mod simplify;
 
+use hausdorff::{hausdorff_bound_m, hausdorff_least_m};
 use simplify::Simplifier;
 
 /// Shapes with fewer triangles are always drawn in full.
@@ -37,73 +38,135 @@ const LEVELS: i32 = 9;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShapeLod {
     /// Three indices per triangle, into the vertices of the full shape.
-    pub indices: Vec<u32>,
+    pub indices: Arc<[u32]>,
     /// Bound on the distance between this surface and the full one, metres in the shape's own axes.
     pub error_m: f64,
 }
 
-/// Levels of detail of a shape, from the full one down.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ShapeLods(Vec<ShapeLod>);
+/// Levels of detail of a shape, from the full one down. It is simplified when first asked for a level that may
+/// be a coarser one, and the levels' errors are measured when a lower bound does not tell them too large.
+#[derive(Clone, Debug)]
+pub struct ShapeLods {
+    shape: Arc<Shape>,
+    is_simplified: bool,
+    simplified: OnceLock<Simplified>,
+    levels: OnceLock<Vec<ShapeLod>>,
+}
+
+/// Coarser versions of a shape.
+#[derive(Clone, Debug)]
+struct Simplified {
+    /// No version has a smaller error, metres; infinite without any.
+    least_m: f64,
+    indices: Vec<Arc<[u32]>>,
+}
 
 impl ShapeLods {
     /// Only the full shape.
     #[must_use]
-    pub fn full(shape: &Shape) -> Self {
-        Self(vec![ShapeLod { indices: shape.indices.clone(), error_m: 0.0 }])
+    pub fn full(shape: Arc<Shape>) -> Self {
+        Self { shape, is_simplified: false, simplified: OnceLock::new(), levels: OnceLock::new() }
     }
 
-    /// Simplifies a shape.
+    /// Levels of a shape, unless it is too small or too large to be simplified.
     #[must_use]
-    pub fn new(shape: &Shape) -> Self {
+    pub fn new(shape: Arc<Shape>) -> Self {
         let is_sound = shape.indices.iter().all(|&corner| (corner as usize) < shape.vertices.len());
-        if !(MIN_TRIANGLES..=MAX_TRIANGLES).contains(&(shape.indices.len() / 3)) || !is_sound {
-            return Self::full(shape);
-        }
-        if shape.has_normals() {
-            Self::simplified::<{ attribute_space::LIT }>(shape)
-        } else {
-            Self::simplified::<{ attribute_space::UNLIT }>(shape)
-        }
-    }
-
-    fn simplified<const AXES: usize>(shape: &Shape) -> Self {
-        let mut lods = Self::full(shape);
-        let bounds = shape.bounds();
-        let diagonal_m = (bounds.max - bounds.min).length();
-        let mut simplifier = Simplifier::<AXES>::new(shape);
-        let full = simplifier.remaining();
-        let tolerance_m = 1e-9 * (diagonal_m + bounds.min.abs().max(bounds.max.abs()).max_element());
-        let (mut count, mut least_m) = (shape.indices.len() / 3, 0.0_f64);
-        for level in 0..LEVELS {
-            simplifier.collapse_within(FINEST_ERROR * diagonal_m * 2_f64.powi(level));
-            if simplifier.count() as f64 > TRIANGLE_RATIO * count as f64 {
-                continue;
-            }
-            count = simplifier.count();
-            let left = simplifier.remaining();
-            let error_m = hausdorff::hausdorff_bound_m(&simplifier.points, &full, &left, tolerance_m);
-            if !error_m.is_finite() {
-                break;
-            }
-            least_m = least_m.max(error_m);
-            lods.0.push(ShapeLod { indices: left.into_iter().flatten().collect(), error_m: least_m });
-        }
-        lods
+        let is_simplified = (MIN_TRIANGLES..=MAX_TRIANGLES).contains(&(shape.indices.len() / 3)) && is_sound;
+        Self { is_simplified, ..Self::full(shape) }
     }
 
     /// The levels, from the full one down, with increasing error.
     #[must_use]
     pub fn levels(&self) -> &[ShapeLod] {
-        &self.0
+        let measure = || match self.shape.has_normals() {
+            true => self.measured::<{ attribute_space::LIT }>(),
+            false => self.measured::<{ attribute_space::UNLIT }>(),
+        };
+        get_or_make(&self.levels, measure).as_slice()
+    }
+
+    /// Three indices per triangle of a level, into the vertices of the full shape.
+    #[must_use]
+    pub fn indices(&self, level: usize) -> &[u32] {
+        if level == 0 { &self.shape.indices } else { &self.levels()[level].indices }
     }
 
     /// Index of the coarsest level within an error, metres in the shape's own axes.
     #[must_use]
     pub fn coarsest_within(&self, error_m: f64) -> usize {
         // False for NaN.
-        self.0.iter().rposition(|level| level.error_m <= error_m).unwrap_or(0)
+        match self.is_simplified && error_m > 0.0 && error_m >= self.simplified().least_m {
+            true => self.levels().iter().rposition(|level| level.error_m <= error_m).unwrap_or(0),
+            false => 0,
+        }
     }
+
+    fn simplified(&self) -> &Simplified {
+        get_or_make(&self.simplified, || match self.shape.has_normals() {
+            true => simplified::<{ attribute_space::LIT }>(&self.shape),
+            false => simplified::<{ attribute_space::UNLIT }>(&self.shape),
+        })
+    }
+
+    fn measured<const AXES: usize>(&self) -> Vec<ShapeLod> {
+        let mut levels = vec![ShapeLod { indices: self.shape.indices[..].into(), error_m: 0.0 }];
+        if self.is_simplified {
+            let full = Simplifier::<AXES>::new(&self.shape);
+            let measure = |indices: &Arc<[u32]>| {
+                let (left, tolerance_m) = (indices.as_chunks().0, tolerance_m(&self.shape));
+                let error_m = hausdorff_bound_m(&full.points, &full.triangles, left, tolerance_m);
+                ShapeLod { indices: indices.clone(), error_m }
+            };
+            levels.par_extend(self.simplified().indices.par_iter().map(measure));
+        }
+        for finer in 1..levels.len() {
+            levels[finer].error_m = levels[finer].error_m.max(levels[finer - 1].error_m);
+        }
+        levels.retain(|level| level.error_m.is_finite());
+        levels
+    }
+}
+
+/// Simplifies a shape.
+fn simplified<const AXES: usize>(shape: &Shape) -> Simplified {
+    let mut simplifier = Simplifier::<AXES>::new(shape);
+    let full = simplifier.remaining();
+    simplifier.begin();
+    let (mut count, mut indices, mut least_m) = (shape.indices.len() / 3, Vec::new(), f64::INFINITY);
+    for level in 0..LEVELS {
+        simplifier.collapse_within(FINEST_ERROR * diagonal_m(shape) * 2_f64.powi(level));
+        if simplifier.count() as f64 > TRIANGLE_RATIO * count as f64 {
+            continue;
+        }
+        count = simplifier.count();
+        let left = simplifier.remaining();
+        if indices.is_empty() {
+            least_m = hausdorff_least_m(&simplifier.points, &full, &left, tolerance_m(shape));
+        }
+        indices.push(left.into_iter().flatten().collect());
+    }
+    Simplified { least_m, indices }
+}
+
+/// The value of a cell, which is made outside of its lock: with the lock held, the thread may take up a task
+/// that waits for it.
+fn get_or_make<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    cell.get().unwrap_or_else(|| {
+        let made = make();
+        cell.get_or_init(|| made)
+    })
+}
+
+fn diagonal_m(shape: &Shape) -> f64 {
+    let bounds = shape.bounds();
+    (bounds.max - bounds.min).length()
+}
+
+/// Distance within which surfaces may be the same but for rounding: the least error of a level.
+fn tolerance_m(shape: &Shape) -> f64 {
+    let bounds = shape.bounds();
+    1e-9 * (diagonal_m(shape) + bounds.min.abs().max(bounds.max.abs()).max_element())
 }
 
 /// Levels of detail of all shapes of a scene.
@@ -113,7 +176,7 @@ pub struct SceneLods {
 }
 
 impl SceneLods {
-    /// Simplifies each shape of a scene once. Blended shapes are not simplified: a bound on the distance does
+    /// Levels of each shape of a scene. Blended shapes are not simplified: a bound on the distance does
     /// not bound the number of layers along a ray.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
@@ -128,12 +191,10 @@ impl SceneLods {
             shapes.insert(Arc::as_ptr(&mesh.shape) as usize, &mesh.shape);
         });
         let levels = |(key, shape): (usize, &Arc<Shape>)| {
-            (
-                key,
-                Arc::new(if blended.contains(&key) { ShapeLods::full(shape) } else { ShapeLods::new(shape) }),
-            )
+            let levels = if blended.contains(&key) { ShapeLods::full } else { ShapeLods::new };
+            (key, Arc::new(levels(shape.clone())))
         };
-        Self { of: shapes.into_par_iter().map(levels).collect() }
+        Self { of: shapes.into_iter().map(levels).collect() }
     }
 
     /// Levels of a shape of the scene.
@@ -142,7 +203,7 @@ impl SceneLods {
         self.of
             .get(&(Arc::as_ptr(shape) as usize))
             .cloned()
-            .unwrap_or_else(|| Arc::new(ShapeLods::full(shape)))
+            .unwrap_or_else(|| Arc::new(ShapeLods::full(shape.clone())))
     }
 }
 
@@ -206,7 +267,7 @@ impl ModelLod {
             let levels = levels.shape_lods(&mesh.shape);
             let level = levels.coarsest_within(tolerance.error_m(bounds, pose) / lod_stretch(mesh));
             detail.meshes += 1;
-            detail.triangles += levels.levels()[level].indices.len() as u64 / 3;
+            detail.triangles += levels.indices(level).len() as u64 / 3;
             detail.finest_triangles += mesh.shape.indices.len() as u64 / 3;
         }
         detail

@@ -3,7 +3,7 @@
 
 use camsim_core::{
     pose::CameraPose,
-    scene::{Light, MeshVertex, Shape, ShapeLods, transformed_normal},
+    scene::{Light, MeshVertex, Shape, transformed_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -58,13 +58,10 @@ pub(super) struct Scratch<const N: usize> {
 }
 
 impl Piece {
-    /// Pieces of a shape, by level of detail.
-    pub fn of_levels(shape: &Shape, levels: &ShapeLods) -> Vec<Vec<Self>> {
+    /// Pieces of a level of detail of a shape.
+    pub fn of_level(shape: &Shape, indices: &[u32]) -> Vec<Self> {
         let canonical = shape.canonical_vertices();
-        let pieces = |indices: &[u32]| {
-            indices.chunks(3 * TRIANGLES_PER_CHUNK).map(|some| Self::new(shape, &canonical, some)).collect()
-        };
-        levels.levels().iter().map(|level| pieces(&level.indices)).collect()
+        indices.chunks(3 * TRIANGLES_PER_CHUNK).map(|some| Self::new(shape, &canonical, some)).collect()
     }
 
     /// `canonical` is [`Shape::canonical_vertices`] of the shape.

@@ -21,16 +21,18 @@ use crate::{
 const MIN_BYTES: u64 = 1 << 16;
 
 /// Uploads the placements of the meshes that may be in view from a key frame, and selects their levels of
-/// detail. Returns the mesh of each placement.
+/// detail, uploading those that are new. Returns the mesh of each placement.
 pub(super) fn upload_placements(
+    gpu: &GpuContext,
     recorder: &mut Recorder<'_>,
     slot: &mut DrawSlot,
-    buffers: &SceneBuffers,
+    buffers: &mut SceneBuffers,
     pose: &CameraPose,
     tolerance: &LodTolerance,
     base_ned_m: DVec3,
 ) -> Vec<u32> {
     let (meshes_in_view, level_instances) = buffers.meshes.in_view(pose, tolerance);
+    buffers.upload_levels(gpu, &level_instances);
     slot.level_instances = level_instances;
     let placement = |&i: &u32| {
         let shape = &buffers.meshes.placed[i as usize];
@@ -68,11 +70,11 @@ pub(super) fn draw_meshes(
         if let Some(normals) = &batch.normals {
             pass.set_vertex_buffer(1, normals.slice(..));
         }
-        pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
         for (indices, instances) in
-            batch.ranges.iter().zip(level_instances).filter(|(_, instances)| !instances.is_empty())
+            batch.indices.iter().zip(level_instances).filter(|(_, instances)| !instances.is_empty())
         {
-            pass.draw_indexed(indices.clone(), 0, instances.clone());
+            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..(indices.size() / 4) as u32, 0, instances.clone());
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Loads the scene of a scenario into the local frame of its log.
 
-use std::{cell::RefCell, collections::HashSet, sync::Arc};
+use std::{cell::RefCell, collections::HashSet, path::Path, sync::Arc};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     board_file::read_board,
-    gltf_file::{GltfOptions, MAX_RADIUS_M, read_moving_gltf},
+    gltf_file::{GltfOptions, MAX_RADIUS_M, Model, ModelMotion, read_moving_gltf},
     raster::pictures::read_texture,
     raster::{HeightShift, TerrainSummary, read_terrain_in_light},
     text::wording::joined_notes,
@@ -85,9 +85,11 @@ pub(super) fn load_scene(
                 .to_owned(),
         );
     }
-    let mut of_models = Vec::new();
+    let (mut models, mut of_models) = (Vec::new(), Vec::new());
     for spec in &spec.gltf {
-        of_models.push((spec.file.as_path(), add_model(scenario, log, spec, &mut scene, &mut objects)?));
+        let model = read_once(&mut models, scenario, spec)?;
+        of_models
+            .push((spec.file.as_path(), add_model(scenario, log, spec, &model, &mut scene, &mut objects)?));
     }
     notes.extend(joined_notes(of_models.iter().map(|(file, notes)| (*file, &notes[..]))));
     scene.objects = objects.into_objects();
@@ -119,14 +121,15 @@ fn blended_triangles_note(scene: &Scene) -> Option<String> {
     })
 }
 
-/// Adds a model at all its placements. Returns notes about it.
-fn add_model(
+/// What a model is read by, and the model.
+type KnownModel<'a> = ((&'a Path, GltfOptions, ModelMotion), Arc<Model>);
+
+/// Reads the model of an entry of the scene, unless another entry has: all its copies share shapes and textures.
+fn read_once<'a>(
+    known: &mut Vec<KnownModel<'a>>,
     scenario: &Scenario,
-    log: &FlightLog,
-    spec: &GltfSpec,
-    scene: &mut Scene,
-    objects: &mut ObjectList,
-) -> Result<Vec<String>, LoadError> {
+    spec: &'a GltfSpec,
+) -> Result<Arc<Model>, LoadError> {
     let number = |n: Option<u32>| n.map(|n| n as usize);
     let options = GltfOptions {
         scene: number(spec.scene),
@@ -134,10 +137,27 @@ fn add_model(
         animation: number(spec.animation),
         normals: scenario.scene.light.is_some(),
     };
-    let model = read_moving_gltf(&spec.file, options, &model_motion(spec))?;
+    let key = (spec.file.as_path(), options, model_motion(spec));
+    if let Some((_, model)) = known.iter().find(|(other, _)| *other == key) {
+        return Ok(model.clone());
+    }
+    let model = Arc::new(read_moving_gltf(key.0, options, &key.2)?);
+    known.push((key, model.clone()));
+    Ok(model)
+}
+
+/// Adds a model at all its placements. Returns notes about it.
+fn add_model(
+    scenario: &Scenario,
+    log: &FlightLog,
+    spec: &GltfSpec,
+    model: &Model,
+    scene: &mut Scene,
+    objects: &mut ObjectList,
+) -> Result<Vec<String>, LoadError> {
     let notes_of =
         |others: Vec<String>| -> Vec<String> { model.notes.iter().cloned().chain(others).collect() };
-    let model_objects = ModelObjects::new(spec, &model)?;
+    let model_objects = ModelObjects::new(spec, model)?;
     if let Some(carrier) = carrier(scenario, log, spec, scene.terrain.as_ref())? {
         let position_ned_m = carrier.start().position_m;
         check_reach(spec, position_ned_m, model.radius_m * spec.scale)?;

@@ -23,6 +23,8 @@ const SAMPLE_STRIDE: usize = 64;
 const QUARTER_RATIO: f64 = 4.0;
 /// Fraction of a triangle's height that is not worth a cut.
 const SLIVER: f64 = 1e-9;
+/// Difference of two bounds by rounding, and more, relative to the tolerance.
+const ROUNDING: f64 = 1e5;
 /// A part is cut only if its bound exceeds the known distance by this factor.
 const CUT_RATIO: f64 = 1.1;
 
@@ -38,6 +40,19 @@ pub(super) fn hausdorff_bound_m<const AXES: usize>(
     }
     let one_sided = HausdorffSearch::new(points, other, tolerance_m).farthest_m(one, tolerance_m);
     HausdorffSearch::new(points, one, tolerance_m).farthest_m(other, one_sided)
+}
+
+/// Lower bound of [`hausdorff_bound_m`]: how far the corners of some triangles are from the others.
+pub(super) fn hausdorff_least_m<const AXES: usize>(
+    points: &[Point<AXES>],
+    one: &[[u32; 3]],
+    other: &[[u32; 3]],
+    tolerance_m: f64,
+) -> f64 {
+    let search = HausdorffSearch::new(points, other, tolerance_m);
+    let corners = |&triangle: &[u32; 3]| triangle.map(|corner| points[corner as usize]);
+    let some = one.iter().step_by(SAMPLE_STRIDE).map(|triangle| search.lower_bound_m(&corners(triangle)));
+    tolerance_m.max(some.fold(0.0, f64::max) - ROUNDING * tolerance_m)
 }
 
 /// Corners of a part of a triangle.

@@ -97,7 +97,7 @@ impl<const AXES: usize> Simplifier<AXES> {
             of.iter().for_each(|&vertex| triangles_of[position_of[vertex as usize] as usize].push(i));
         }
         let count = triangles.len();
-        let mut simplifier = Self {
+        Self {
             alive: vec![true; count],
             removed: vec![Vec::new(); count],
             changes: vec![0; points.len()],
@@ -109,12 +109,14 @@ impl<const AXES: usize> Simplifier<AXES> {
             at_border: Vec::new(),
             position_of,
             triangles_of,
-        };
-        simplifier.at_border = (0..simplifier.triangles_of.len() as u32)
-            .map(|position| !simplifier.along_border(position).is_empty())
-            .collect();
-        (0..simplifier.triangles_of.len() as u32).for_each(|position| simplifier.enqueue(position));
-        simplifier
+        }
+    }
+
+    /// Queues the first collapses.
+    pub fn begin(&mut self) {
+        let positions = 0..self.points.len() as u32;
+        self.at_border = positions.clone().map(|position| !self.along_border(position).is_empty()).collect();
+        positions.for_each(|position| self.enqueue(position));
     }
 
     /// The remaining triangles.

@@ -42,14 +42,15 @@ fn away_m<const AXES: usize>(
 
 /// Tests random points of every level.
 fn check_levels<const AXES: usize>(shape: &Shape) {
-    let lods = ShapeLods::new(shape);
+    let lods = ShapeLods::new(shape.clone().into());
     let counts: Vec<usize> = lods.levels().iter().map(|level| level.indices.len() / 3).collect();
     assert!(counts.len() >= 4 && counts.windows(2).all(|pair| pair[1] < pair[0]), "{counts:?}");
     assert!(*counts.last().unwrap() < 100, "{counts:?}");
     let points = attribute_space::AttributeSpace::new(shape).points::<AXES>(shape);
     for level in &lods.levels()[1..] {
         let mut farthest = 0.0_f64;
-        for (own, other) in [(&shape.indices, &level.indices), (&level.indices, &shape.indices)] {
+        let (full, left) = (&shape.indices[..], &level.indices[..]);
+        for (own, other) in [(full, left), (left, full)] {
             for (k, t) in own.chunks_exact(3).enumerate() {
                 let part =
                     |n: u32| f64::from(crate::noise::pcg4d([k as u32, n, 5, 0])[0] >> 8) / f64::from(1 << 24);
@@ -75,6 +76,28 @@ fn every_point_of_a_level_is_within_its_error() {
     check_levels::<{ attribute_space::UNLIT }>(&globe(24));
 }
 
+#[test]
+fn levels_are_chosen_as_if_all_were_made_at_once() {
+    for shape in [globe(8), lit_globe(8)].map(Arc::new) {
+        let all = ShapeLods::new(shape.clone());
+        let least_m = all.simplified().least_m;
+        let errors_m = all.levels().iter().map(|level| level.error_m).chain([least_m, 0.0, f64::NAN]);
+        for error_m in errors_m.flat_map(|error_m| [0.5, 1.0 - 1e-9, 1.0].map(|by| by * error_m)) {
+            let lods = ShapeLods::new(shape.clone());
+            let coarsest = all.levels().iter().rposition(|level| level.error_m <= error_m).unwrap_or(0);
+            assert_eq!(lods.coarsest_within(error_m), coarsest, "{error_m}");
+            assert_eq!(
+                lods.levels.get().is_none(),
+                error_m.is_nan() || error_m < least_m,
+                "{error_m} {least_m}"
+            );
+        }
+    }
+    // The lower bound is of use: most of the first level's error.
+    let globe = ShapeLods::new(globe(24).into());
+    assert!(globe.simplified().least_m > 0.5 * globe.levels()[1].error_m);
+}
+
 /// A sphere with its normals.
 fn lit_globe(n: u32) -> Shape {
     let mut shape = globe(n);
@@ -86,7 +109,7 @@ fn lit_globe(n: u32) -> Shape {
 fn every_normal_of_a_level_is_within_its_error() {
     check_levels::<{ attribute_space::LIT }>(&lit_globe(24));
     // With normals, fewer triangles can be removed for the same error.
-    let (lit, unlit) = (ShapeLods::new(&lit_globe(24)), ShapeLods::new(&globe(24)));
+    let (lit, unlit) = (ShapeLods::new(lit_globe(24).into()), ShapeLods::new(globe(24).into()));
     let left = |levels: &ShapeLods| levels.levels()[levels.coarsest_within(0.6)].indices.len();
     assert!(left(&lit) > left(&unlit), "{} {}", left(&lit), left(&unlit));
 }
@@ -107,7 +130,7 @@ fn lit_shapes_with_anisotropic_scale_have_no_levels() {
         let ratio = lod_stretch(&mesh);
         assert!(ratio == expected || (ratio - expected).abs() < 1e-12, "{ratio} {expected}");
         if uneven && normals {
-            assert_eq!(ShapeLods::new(&mesh.shape).coarsest_within(5.0 / ratio), 0);
+            assert_eq!(ShapeLods::new(mesh.shape.clone()).coarsest_within(5.0 / ratio), 0);
         }
     }
 }
@@ -137,7 +160,7 @@ fn flat_walls_simplify_without_error() {
             ]);
         }
     }
-    let lods = ShapeLods::new(&shape);
+    let lods = ShapeLods::new(shape.clone().into());
     let level = &lods.levels()[1];
     assert_eq!(level.indices.len() / 3, 12);
     assert!(level.error_m < 1e-6, "{}", level.error_m);
@@ -146,7 +169,7 @@ fn flat_walls_simplify_without_error() {
         vertex.tint =
             [if crate::noise::pcg4d([k, 1, 2, 3])[0].is_multiple_of(2) { 0.0 } else { 1.0 }, 0.5, 0.5, 1.0];
     }
-    let striped = ShapeLods::new(&shape);
+    let striped = ShapeLods::new(shape.clone().into());
     assert!(
         striped.coarsest_within(0.01) == 0,
         "{:?}",
@@ -202,7 +225,7 @@ fn openings_and_hollows_are_not_filled() {
                 ]);
             }
         }
-        let lods = ShapeLods::new(&shape);
+        let lods = ShapeLods::new(shape.clone().into());
         let [full, level] = [0, 1].map(|k| &lods.levels()[k]);
         assert!(
             level.error_m < 1e-6 && 2 * level.indices.len() < full.indices.len(),
@@ -218,13 +241,13 @@ fn openings_and_hollows_are_not_filled() {
 #[test]
 fn small_shapes_and_invalid_indices_are_kept() {
     let small = globe(3);
-    assert_eq!(ShapeLods::new(&small), ShapeLods::full(&small));
+    assert_eq!(ShapeLods::new(small.into()).levels().len(), 1);
     let mut bad = globe(8);
     bad.indices[7] = 1_000_000;
-    assert_eq!(ShapeLods::new(&bad).levels().len(), 1);
+    assert_eq!(ShapeLods::new(bad.into()).levels().len(), 1);
     let mut flat = globe(8);
     flat.vertices.iter_mut().for_each(|vertex| vertex.position_m = [1.0; 3]);
-    assert_eq!(ShapeLods::new(&flat).levels().len(), 1);
+    assert_eq!(ShapeLods::new(flat.into()).levels().len(), 1);
 }
 
 #[test]
