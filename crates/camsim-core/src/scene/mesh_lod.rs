@@ -43,8 +43,8 @@ pub struct ShapeLod {
     pub error_m: f64,
 }
 
-/// Levels of detail of a shape, from the full one down. It is simplified when first asked for a level that may
-/// be a coarser one, and the levels' errors are measured when a lower bound does not tell them too large.
+/// Levels of detail of a shape, from the full one down. It is simplified when first asked for one within an
+/// error; the levels' errors are measured when that is not below a lower bound of the least of them.
 #[derive(Clone, Debug)]
 pub struct ShapeLods {
     shape: Arc<Shape>,
@@ -120,8 +120,10 @@ impl ShapeLods {
             };
             levels.par_extend(self.simplified().indices.par_iter().map(measure));
         }
-        for finer in 1..levels.len() {
-            levels[finer].error_m = levels[finer].error_m.max(levels[finer - 1].error_m);
+        let mut least_m = 0.0_f64;
+        for level in &mut levels {
+            least_m = least_m.max(level.error_m);
+            level.error_m = least_m;
         }
         levels.retain(|level| level.error_m.is_finite());
         levels
