@@ -18,7 +18,8 @@ use camsim_core::{
 use crate::{
     choose::{
         frame_context::{FrameContext, FrameScene},
-        obstacle, picture,
+        obstacle,
+        picture::{self, PictureChoice},
         placement::{cpu_rasterises, place},
         plan_inputs::{self, PlanInputs, SceneKnowledge, zoom_at},
         recent_cache::RecentCache,
@@ -52,16 +53,26 @@ pub struct Planner {
     rasterises: bool,
     /// The last groups of frames that were planned.
     groups: RecentCache<FrameGroup>,
-    /// The last plan of a frame by itself: callers may need it twice.
-    last: RecentCache<FramePlan>,
+    /// The last frames that were planned by themselves: callers may need them twice, and groups their middle.
+    last: RecentCache<PlannedAlone>,
     /// The planners of the faces that a wide field is divided among.
     faces: Vec<Self>,
 }
 
+/// A frame that was planned by itself.
+#[derive(Debug)]
+struct PlannedAlone {
+    plan: FramePlan,
+    picture: PictureChoice,
+}
+
 /// The plan of a frame, step by step.
-fn plan_of(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Result<FramePlan, PlanError> {
-    let picture = picture::choose(context, scene);
-    let mut draft = Draft::new(context, scene, &picture)?;
+fn plan_of(
+    context: &FrameContext<'_>,
+    scene: &FrameScene<'_>,
+    picture: &PictureChoice,
+) -> Result<FramePlan, PlanError> {
+    let mut draft = Draft::new(context, scene, picture)?;
     draft.choose_ray();
     let exposure = draft.choose_exposure_and_edges();
     let tried = draft.ideal;
@@ -69,7 +80,7 @@ fn plan_of(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Result<FramePl
     draft.fit_ideal_to(&choice)?;
     draft.choose_key_frames(&mut choice);
     choice.predicted.picture_error_obstacle =
-        obstacle::to_picture_error(context.quality(), &picture, &choice.predicted);
+        obstacle::to_picture_error(context.quality(), picture, &choice.predicted);
     choice.predicted.picture_error_kept = choice.predicted.picture_error_obstacle.is_none();
     draft.note_static_skips(choice.method.temporal);
     Ok(draft.finish(choice))
@@ -122,7 +133,7 @@ impl Planner {
             capabilities: Capabilities::default(),
             rasterises: false,
             groups: RecentCache::new(cached_groups),
-            last: RecentCache::new(1),
+            last: RecentCache::new(cached_groups),
         })
     }
 
@@ -220,11 +231,26 @@ impl Planner {
 
     /// The plan of a frame by itself.
     fn plan_alone(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        self.planned_alone(frame).map(|planned| planned.plan.clone())
+    }
+
+    fn planned_alone(&self, frame: u64) -> Result<Arc<PlannedAlone>, PlanError> {
         let find = || {
             let context = FrameContext::new(&self.inputs, frame, None)?;
-            plan_of(&context, &context.scene())
+            let scene = context.scene();
+            let picture =
+                self.picture_alike(&context, &scene).unwrap_or_else(|| picture::choose(&context, &scene));
+            let plan = plan_of(&context, &scene, &picture)?;
+            Ok(PlannedAlone { plan, picture })
         };
-        self.last.try_get(frame, find).map(|plan| FramePlan::clone(&plan))
+        self.last.try_get(frame, find)
+    }
+
+    /// The picture of a frame sampled as the middle one of those that see nearly the same is, if that does for it
+    /// as well.
+    fn picture_alike(&self, context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Option<PictureChoice> {
+        let middle = context.middle_of_company().filter(|middle| *middle != context.frame)?;
+        picture::choose_alike(context, scene, &self.planned_alone(middle).ok()?.picture)
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
@@ -233,7 +259,8 @@ impl Planner {
             return None;
         }
         let number = self.group_of(frame);
-        self.groups.get(number, || FrameGroup::new(&self.inputs, plan_of, number)).plan(frame)
+        let own = |middle: u64| self.plan_alone(middle).ok();
+        self.groups.get(number, || FrameGroup::new(&self.inputs, plan_of, own, number)).plan(frame)
     }
 
     /// Number of the group of a frame: frames of one are best planned one after the other, by the same

@@ -53,6 +53,13 @@ impl Shape {
         !self.normals.is_empty() && self.normals.len() == self.vertices.len()
     }
 
+    /// Vertices of a triangle.
+    #[must_use]
+    #[inline]
+    pub fn triangle(&self, triangle: u32) -> [u32; 3] {
+        [0, 1, 2].map(|k| self.indices[3 * triangle as usize + k])
+    }
+
     /// For each vertex the first one that equals it in all attributes. Files repeat vertices per side for
     /// normals and textures that may be absent.
     #[must_use]

@@ -119,6 +119,23 @@ impl RayBvh {
         best
     }
 
+    /// Items in boxes that are accepted, as are those around them, in no particular order.
+    pub fn items_in(&self, accept: impl Fn(&Aabb) -> bool) -> Vec<u32> {
+        let mut found = Vec::new();
+        let mut waiting: Vec<u32> = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
+        while let Some(at) = waiting.pop() {
+            let RayBvhNode { boxes, holds } = &self.nodes[at as usize];
+            for (lane, &held) in holds.iter().enumerate() {
+                let Aabb { min, max } = boxes.get(lane);
+                if !accept(&Aabb { min: min + self.middle, max: max + self.middle }) {
+                    continue;
+                }
+                if held & ITEM == 0 { waiting.push(held) } else { found.push(held & !ITEM) }
+            }
+        }
+        found
+    }
+
     /// First intersection by testing all items.
     fn first_of_all<T>(&self, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
         let is_there =

@@ -44,6 +44,7 @@ pub use build::TerrainGrid;
 pub use detail::TerrainDetail;
 pub use placed::PlacedMesh;
 pub use query::Frustum;
+pub use query::SeenTriangle;
 pub use query::TerrainHit;
 pub use query::intersect_triangle;
 pub use select::{DrawnCell, LodSelection, TerrainMesh};

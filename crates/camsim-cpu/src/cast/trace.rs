@@ -171,7 +171,7 @@ impl SceneTrees {
         let origin = *shape_from_ned * (origin_ned_m - mesh.origin_ned_m);
         let direction = *shape_from_ned * direction_ned;
         let meet = |triangle: u32, limit: f64| {
-            let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+            let corners = mesh.shape.triangle(triangle);
             let points = corners.map(|corner| mesh.position_ned_m(corner));
             let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
             has_depth(mesh, &MeshHit { t, mesh: number, corners, weights }).then_some((NO_MORE, ()))

@@ -1,6 +1,6 @@
 //! What a frame is planned with: instants, camera, probes, and what is in view.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use camsim_core::{
     mount::CameraPath,
@@ -44,9 +44,6 @@ use crate::{
     },
 };
 
-/// Frames of a group whose probes are used together to estimate how many silhouettes there are.
-const FRAMES_OF_A_GROUP: u64 = 8;
-
 /// A frame before anything is chosen for it.
 #[derive(Clone)]
 pub(crate) struct FrameContext<'a> {
@@ -58,12 +55,10 @@ pub(crate) struct FrameContext<'a> {
     pub window_s: [f64; 2],
     pub zoom: Option<f64>,
     pub reach: Arc<LensReach>,
-    /// The lens with the probes at which the pipeline is run dry.
-    pub dry_run_reach: Arc<LensReach>,
     /// The ideal frame that others are made from too, if this one is to be.
     pub shared: Option<&'a SharedIdeal>,
-    /// Whether the frame has half of the probes: neighbours have the others.
-    has_fewer_probes: bool,
+    /// Frames that have a quarter of the probes each, and share what they find; none if this one has all.
+    company: Range<u64>,
     /// Request for its sampling plan.
     pub request: SamplingRequest,
     /// Key instant.
@@ -102,29 +97,19 @@ impl<'a> FrameContext<'a> {
         frame: u64,
         shared: Option<&'a SharedIdeal>,
     ) -> Result<Self, PlanError> {
-        Self::with_probes(inputs, frame, shared, shared.is_some())
-    }
-
-    /// A frame by itself with the probes of frames of a group, to be compared with them.
-    pub fn as_in_group(inputs: &'a PlanInputs, frame: u64) -> Result<Self, PlanError> {
-        Self::with_probes(inputs, frame, None, true)
-    }
-
-    fn with_probes(
-        inputs: &'a PlanInputs,
-        frame: u64,
-        shared: Option<&'a SharedIdeal>,
-        has_fewer_probes: bool,
-    ) -> Result<Self, PlanError> {
         let stamp_s = inputs.stamp_s(frame);
         let zoom = inputs.zoom.as_ref().map(|_| zoom_at(&inputs.sequence.zoom_track, stamp_s));
-        let half = if has_fewer_probes { inputs.half_the_probes(frame) } else { None };
-        let reach = match (&half.or_else(|| inputs.fixed.clone()), &inputs.zoom, zoom) {
+        let company = match shared {
+            _ if inputs.has_company(frame) => inputs.span_of(frame),
+            Some(shared) => shared.frames.clone(),
+            None => 0..0,
+        };
+        let quarter = if company.is_empty() { None } else { inputs.quarter_of_the_probes(frame) };
+        let reach = match (&quarter.or_else(|| inputs.fixed.clone()), &inputs.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
             (None, Some(table), Some(value)) => Arc::new(inputs.zoomed(table, value)?),
             _ => return Err(PlanError::NoRay),
         };
-        let quarter = if has_fewer_probes { inputs.quarter_of_the_probes(frame) } else { None };
         let shutter = inputs.shutter_of(frame);
         let (first, last) = shutter.window_s();
         let window_s = [stamp_s + first, stamp_s + last];
@@ -142,10 +127,9 @@ impl<'a> FrameContext<'a> {
             shutter,
             window_s,
             zoom,
-            dry_run_reach: quarter.unwrap_or_else(|| reach.clone()),
             reach,
             shared,
-            has_fewer_probes,
+            company,
             request: SamplingRequest::default(),
             key_s,
             key_pose,
@@ -157,6 +141,12 @@ impl<'a> FrameContext<'a> {
     /// The frame with another request.
     pub fn requesting(self, request: SamplingRequest) -> Self {
         Self { request, ..self }
+    }
+
+    /// The frame in the middle of those that see nearly the same, by which all are sampled; `None` without.
+    pub fn middle_of_company(&self) -> Option<u64> {
+        let Range { start, end } = self.company;
+        (start < end).then_some((start + end) / 2)
     }
 
     pub fn quality(&self) -> &'a QualitySpec {
@@ -283,15 +273,16 @@ impl<'a> FrameContext<'a> {
         let model = |all: &Neighbourhoods| {
             SilhouetteModel::new(all, &reach.camera, key_pose, &plane, disocclusion, least_fraction)
         };
-        if !self.has_fewer_probes {
-            return Some(model(&own));
-        }
-        Some(model(&own.with(self.neighbourhoods_of_others())))
+        Some(if self.company.is_empty() {
+            model(&own)
+        } else {
+            model(&own.with(self.neighbourhoods_of_others()))
+        })
     }
 
     /// Neighbourhoods of the probes of a frame.
     fn neighbourhoods(&self, frame: u64, reach: &LensReach) -> Arc<Neighbourhoods> {
-        let PlanInputs { sequence, scene, neighbourhoods, neighbourhoods_of_halves, .. } = self.inputs;
+        let PlanInputs { sequence, scene, neighbourhoods, neighbourhoods_of_quarters, .. } = self.inputs;
         let gain = &gain(sequence, &reach.camera, frame);
         let search = NeighbourhoodSearch {
             reach,
@@ -301,25 +292,17 @@ impl<'a> FrameContext<'a> {
             stamp_s: self.inputs.stamp_s(frame),
             gain,
         };
-        let cache = if self.has_fewer_probes { neighbourhoods_of_halves } else { neighbourhoods };
+        let cache = if self.company.is_empty() { neighbourhoods } else { neighbourhoods_of_quarters };
         cache.get(frame, || search.neighbourhoods())
     }
 
-    /// Neighbourhoods of the probes of the other frames of a group, as their own cameras would see them:
-    /// silhouettes are few, and half of the probes of one frame are too few.
+    /// Neighbourhoods of the probes of the other frames, as their own cameras would see them: silhouettes are few,
+    /// and a quarter of the probes of one frame is too few.
     fn neighbourhoods_of_others(&self) -> impl Iterator<Item = Neighbourhoods> {
-        let (inputs, frame) = (self.inputs, self.frame);
-        let first = frame / FRAMES_OF_A_GROUP * FRAMES_OF_A_GROUP;
-        // The frame beside it has the other half, whatever its group is.
-        let is_beside = move |other: u64| {
-            other == frame ^ 1 || other != frame && inputs.group_of(other) == inputs.group_of(frame)
-        };
-        let others = (first..first + FRAMES_OF_A_GROUP)
-            .filter(move |&other| other < inputs.sequence.frames && is_beside(other));
         let own_pose =
             |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.inputs.shutter.dt_pixel_s(x, y));
-        others.filter_map(move |other| {
-            let reach = self.inputs.half_the_probes(other)?;
+        self.company.clone().filter(|&other| other != self.frame).filter_map(move |other| {
+            let reach = self.inputs.quarter_of_the_probes(other)?;
             Some(self.neighbourhoods(other, &reach).seen_from(&reach.probes, own_pose))
         })
     }

@@ -12,6 +12,7 @@ use super::{
     frame_context::{FrameContext, FrameScene},
     prices::Price,
     sampling::{FINEST_SCALE, MOST_SCALE, SamplingChoice, SamplingSearch, SamplingTask},
+    shared_ideal::SamplingRequest,
 };
 use crate::{
     ir::{
@@ -38,6 +39,7 @@ const FEW_ADD: f64 = 0.3;
 const MANY_ADD: f64 = 0.03;
 
 /// What was chosen.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct PictureChoice {
     pub plan: SamplingPlan,
     /// What silhouettes cost then.
@@ -117,6 +119,28 @@ pub(crate) fn choose(context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Pict
     SilhouetteSearch { context, scene, task, model }.choose()
 }
 
+/// The picture sampled as that of a frame that sees nearly the same, which was searched for; `None` where it then
+/// does not keep `quality.max_error_dn`, or come as near as that does, or where rays are better.
+pub(crate) fn choose_alike(
+    context: &FrameContext<'_>,
+    scene: &FrameScene<'_>,
+    alike: &PictureChoice,
+) -> Option<PictureChoice> {
+    if alike.rays > 0 || context.is_paper() {
+        return None;
+    }
+    let quality = context.quality();
+    let request = SamplingRequest { given: Some(alike.plan), ..SamplingRequest::default() };
+    let picture = choose(&context.clone().requesting(request), scene);
+    let most_dn = ErrorBudget::new(quality).sampling_dn(&context.inputs.sequence.scene);
+    let is_affordable = |picture: &PictureChoice| {
+        picture.silhouettes.is_none_or(|silhouettes| are_affordable(&silhouettes, quality.max_error_dn))
+    };
+    let does = picture.total_dn <= most_dn.max(NEARLY * alike.total_dn)
+        && (is_affordable(&picture) || !is_affordable(alike));
+    does.then_some(picture)
+}
+
 /// Scale from which on the ideal frame has more pixels, or more along a side.
 fn scale_of(context: &FrameContext<'_>, scene: &FrameScene<'_>, pixels: u64, side_px: u32) -> f64 {
     let [width, height] = scene.ideal.size_px.map(f64::from);
@@ -148,7 +172,9 @@ impl SilhouetteSearch<'_> {
             Silhouettes::Plain => (self.plain(), None),
             Silhouettes::Auto if self.is_plain_by_hand() && scene.may_have_samples => (self.plain(), None),
             // Another instant sees more of what is behind a silhouette than rays could make up for.
-            Silhouettes::Auto if context.shared.is_some() => (self.plain(), None),
+            Silhouettes::Auto if context.shared.is_some() || context.request.given.is_some() => {
+                (self.plain(), None)
+            }
             Silhouettes::Auto if quality.key_frames == Auto::Auto => self.cheaper_of_both(),
             Silhouettes::Auto | Silhouettes::Rays => {
                 let (with_rays, kind) = self.with_rays();

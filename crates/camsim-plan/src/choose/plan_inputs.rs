@@ -1,7 +1,7 @@
 //! What plans of a sequence are made from: the sequence, the renderer's limits, and what is known of lens and
 //! scene.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use camsim_core::{
     camera::{CameraError, CameraModel, ZoomTable},
@@ -13,10 +13,14 @@ use camsim_core::{
 
 use super::recent_cache::RecentCache;
 use crate::{
-    ir::{limits::MAX_IDEAL_PX, plan_error::PlanError},
+    ir::{key_frame::KeyFrame, limits::MAX_IDEAL_PX, plan_error::PlanError},
     picture_error::texture_spectra::SceneSpectra,
     view::{
-        lens_reach::LensReach, neighbourhood::Neighbourhoods, scene_outline::SceneOutline, surfaces::Surfaces,
+        ideal_extent::{TangentBounds, ideal_extent},
+        lens_reach::LensReach,
+        neighbourhood::Neighbourhoods,
+        scene_outline::SceneOutline,
+        surfaces::Surfaces,
     },
 };
 
@@ -26,6 +30,13 @@ const CACHED_FRAMES_A_GROUP: usize = 16;
 /// Threads for each group that is planned at once, and such groups at most.
 const THREADS_A_GROUP: usize = 2;
 const MOST_GROUPS_AT_ONCE: usize = 8;
+
+/// Frames that share what their probes find, at most and at least: spans begin at multiples.
+const FRAMES_OF_A_SPAN: u64 = 8;
+const LEAST_COMPANY: u64 = 4;
+/// Least area of what the first and the last frame of a span show together, in times of one of them, from which
+/// on they do not see the same.
+const ALIKE: f64 = 2.0;
 
 /// What is known of a scene.
 #[derive(Clone, Debug)]
@@ -58,18 +69,18 @@ pub(crate) struct PlanInputs {
     pub zoom_of_others: Option<[ZoomTable; 2]>,
     /// Reach of a lens that does not zoom.
     pub fixed: Option<Arc<LensReach>>,
-    /// The fixed lens with half of its probes, for even frames and odd ones of a group.
-    halves: Option<[Arc<LensReach>; 2]>,
-    /// The fixed lens with a quarter of its probes, for every second of the even frames and of the odd ones.
-    quarters: Option<[[Arc<LensReach>; 2]; 2]>,
+    /// The fixed lens with a quarter of its probes, for four frames in turn.
+    quarters: Option<[Arc<LensReach>; 4]>,
     pub truth: bool,
     pub max_side_px: u32,
     pub max_ideal_px: u64,
     /// Whether fine sampling costs less time than the search for the cheapest.
     pub is_drawing_cheap: bool,
-    /// Neighbourhoods of the probes of recent frames, of all probes and of half of them.
+    /// Neighbourhoods of the probes of recent frames, of all probes and of a quarter of them.
     pub neighbourhoods: RecentCache<Neighbourhoods>,
-    pub neighbourhoods_of_halves: RecentCache<Neighbourhoods>,
+    pub neighbourhoods_of_quarters: RecentCache<Neighbourhoods>,
+    /// Whether the frames of recent spans see nearly the same.
+    spans: RecentCache<bool>,
 }
 
 impl PlanInputs {
@@ -96,12 +107,9 @@ impl PlanInputs {
                 Some(Arc::new(LensReach::with_others(camera, others).ok_or(PlanError::NoRay)?))
             }
         };
-        let halves =
-            fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
-        let quarters = halves.as_ref().map(|halves| {
-            halves
-                .each_ref()
-                .map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low))))
+        let quarters = fixed.as_ref().map(|reach| {
+            [[false, false], [true, false], [false, true], [true, true]]
+                .map(|of| Arc::new(reach.with_a_quarter_of_the_probes(of)))
         });
         let truth = channels.iter().any(|channel| channel.needs_truth());
         let cached = CACHED_FRAMES + CACHED_FRAMES_A_GROUP * groups_at_once();
@@ -112,14 +120,14 @@ impl PlanInputs {
             zoom,
             zoom_of_others,
             fixed,
-            halves,
             quarters,
             truth,
             max_side_px,
             max_ideal_px: MAX_IDEAL_PX,
             is_drawing_cheap: false,
             neighbourhoods: RecentCache::new(cached),
-            neighbourhoods_of_halves: RecentCache::new(cached),
+            neighbourhoods_of_quarters: RecentCache::new(cached),
+            spans: RecentCache::new(cached),
         })
     }
 
@@ -158,19 +166,41 @@ impl PlanInputs {
         self.sequence.stamp_s(frame)
     }
 
-    /// Probes of frames of a group: neighbours in time are nearly alike, and have other probes each.
-    pub fn half_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
-        self.halves
-            .as_ref()
-            .map(|[even, odd]| if frame.is_multiple_of(2) { even.clone() } else { odd.clone() })
+    /// The lens with a quarter of its probes: neighbours in time that see nearly the same have other quarters.
+    pub fn quarter_of_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
+        self.quarters.as_ref().map(|quarters| quarters[(frame % 4) as usize].clone())
     }
 
-    /// Probes of dry runs of frames of a group: their neighbours are made the same way, or nearly, from the
-    /// same ideal frame.
-    pub fn quarter_of_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
-        self.quarters
-            .as_ref()
-            .map(|quarters| quarters[(frame % 2) as usize][(frame / 2 % 2) as usize].clone())
+    /// The frames that share what their probes find, if they see nearly the same.
+    pub fn span_of(&self, frame: u64) -> Range<u64> {
+        let first = frame / FRAMES_OF_A_SPAN * FRAMES_OF_A_SPAN;
+        first..(first + FRAMES_OF_A_SPAN).min(self.sequence.frames)
+    }
+
+    /// Whether the frames around a frame see nearly the same, so that a quarter of the probes does for each.
+    pub fn has_company(&self, frame: u64) -> bool {
+        let span = self.span_of(frame);
+        let is_long = span.contains(&frame) && span.end - span.start >= LEAST_COMPANY;
+        is_long && *self.spans.get(span.start, || self.see_alike(span.clone()).unwrap_or(false))
+    }
+
+    /// Whether the first and the last of some frames see nearly the same; `None` for a lens that zooms.
+    fn see_alike(&self, frames: Range<u64>) -> Option<bool> {
+        let reach = self.fixed.as_ref()?;
+        let (begin_s, end_s) = self.shutter.window_s();
+        let [first_s, last_s] = [frames.start, frames.end - 1].map(|frame| self.stamp_s(frame));
+        let key_s = 0.5 * (first_s + begin_s + last_s + end_s);
+        let keys = [KeyFrame { t_s: key_s, pose: self.path().pose(key_s) }];
+        let extent = |stamp_s: f64| {
+            let shutter = self.shutter_of(frames.start);
+            ideal_extent(reach, self.path(), &shutter, stamp_s, key_s, &keys, &self.scene.surfaces, None)
+        };
+        let area = |extent: TangentBounds| {
+            let [width, height] = extent.pixels(&reach.camera, 1.0).size_px.map(f64::from);
+            width * height
+        };
+        let own = area(extent(0.5 * (first_s + last_s)));
+        Some(area(extent(first_s).and(extent(last_s))) < ALIKE * own)
     }
 
     /// Number of the group of a frame.
@@ -200,7 +230,8 @@ impl PlanInputs {
     /// Forgets what is cached. Plans stay the same.
     pub fn forget(&self) {
         self.neighbourhoods.forget();
-        self.neighbourhoods_of_halves.forget();
+        self.neighbourhoods_of_quarters.forget();
+        self.spans.forget();
     }
 }
 

@@ -45,7 +45,8 @@ const MOST_AREA: f64 = 4.0;
 const FAR: u64 = 8;
 
 /// Plans a frame in its context.
-pub(crate) type PlanFrame = fn(&FrameContext<'_>, &FrameScene<'_>) -> Result<FramePlan, PlanError>;
+pub(crate) type PlanFrame =
+    fn(&FrameContext<'_>, &FrameScene<'_>, &PictureChoice) -> Result<FramePlan, PlanError>;
 
 /// Frames that were planned together.
 #[derive(Debug)]
@@ -59,16 +60,19 @@ impl FrameGroup {
     /// The group of that number. Sharing is compared with what the middle frame would do by itself. A fault
     /// of that frame is its own: the others are then planned by themselves, and so is it, when it is asked
     /// for.
-    pub fn new(inputs: &PlanInputs, plan_frame: PlanFrame, number: u64) -> Self {
+    pub fn new(
+        inputs: &PlanInputs,
+        plan_frame: PlanFrame,
+        plan_alone: impl Fn(u64) -> Option<FramePlan>,
+        number: u64,
+    ) -> Self {
         let size = u64::from(inputs.quality().frames_per_ideal);
         let first = number * size;
         let frames = first..(first + size).min(inputs.sequence.frames);
         let mut plans = vec![None; (frames.end - first) as usize];
         if frames.end - first > 1 {
             let middle = (first + frames.end) / 2;
-            let own = FrameContext::as_in_group(inputs, middle)
-                .and_then(|context| plan_frame(&context, &context.scene()));
-            if let Some(own) = own.ok().filter(|own| !own.edges.has_rays()) {
+            if let Some(own) = plan_alone(middle).filter(|own| !own.edges.has_rays()) {
                 plans = Sharing { inputs, plan_frame, own: &own }.fraction(frames);
             }
         }
@@ -243,7 +247,8 @@ impl<'a> SharingCandidates<'a> {
     fn plan(&self, frame: u64, sampling: SamplingPlan) -> Option<FramePlan> {
         let (context, scene) = self.scene_of(frame, Some(sampling))?;
         let request = SamplingRequest { given: Some(sampling), ..SamplingRequest::default() };
-        (self.sharing.plan_frame)(&context.requesting(request), scene).ok()
+        let context = context.requesting(request);
+        (self.sharing.plan_frame)(&context, scene, &picture::choose(&context, scene)).ok()
     }
 
     /// The frame that is sampled most too coarsely so, by its picture alone. `Err` where one may not be

@@ -79,25 +79,16 @@ impl LensReach {
         Cow::Owned(self.probes.iter().enumerate().filter_map(turn).collect())
     }
 
-    /// The lens with every second of its probes: two neighbours in time, one `odd` and one not, have all of
-    /// them.
-    pub(crate) fn with_half_the_probes(&self, odd: bool) -> Self {
-        self.with_every_second(|probe| probe.is_odd == odd)
-    }
-
-    /// The lens with every second of these again: four neighbours in time have all.
-    pub(crate) fn with_half_of_these(&self, low: bool) -> Self {
-        self.with_every_second(|probe| probe.is_low == low)
-    }
-
-    fn with_every_second(&self, is_one: impl Fn(&Probe) -> bool) -> Self {
+    /// The lens with a quarter of its probes: four frames, of which two are `odd` and two `low`, have all of them.
+    pub(crate) fn with_a_quarter_of_the_probes(&self, [odd, low]: [bool; 2]) -> Self {
         let Self { camera, rays, least_stretch, others, .. } = self;
+        let is_one = |probe: &&Probe| (probe.is_odd, probe.is_low) == (odd, low);
         Self {
             camera: camera.clone(),
             rays: rays.clone(),
             least_stretch: *least_stretch,
-            probes: self.probes.iter().filter(|probe| is_one(probe)).copied().collect(),
-            probe_px: std::f64::consts::SQRT_2 * self.probe_px,
+            probes: self.probes.iter().filter(is_one).copied().collect(),
+            probe_px: 2.0 * self.probe_px,
             others: others.clone(),
         }
     }

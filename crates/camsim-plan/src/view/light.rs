@@ -96,7 +96,7 @@ impl Surfaces {
             let (origin, direction) =
                 (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
             self.shapes[i].for_rays.first(origin, direction, limit, |triangle, limit| -> Option<(f64, ())> {
-                let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+                let corners = mesh.shape.triangle(triangle);
                 let points = corners.map(|corner| mesh.position_ned_m(corner));
                 let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
                 let alpha = mesh.alpha_at(corners, weights).clamp(0.0, 1.0);

@@ -157,8 +157,11 @@ impl NeighbourhoodSearch<'_> {
     fn neighbourhood(&self, number: usize, probe: &Probe) -> Neighbourhood {
         let points = NinePoints::new(self, probe);
         let steps = points.steps();
-        let has_lines = self.surfaces.has_models() && (!steps.is_empty() || points.may_show_models());
-        let crossings = if has_lines { self.line_crossings(number, probe) } else { LineCrossings::default() };
+        // Lines are for models, which may be narrower than the distance of the points; where the terrain steps,
+        // they count how often.
+        let has_lines = self.surfaces.has_models() && (!steps.is_empty() || points.beam.may_show_models());
+        let crossings =
+            if has_lines { self.line_crossings(number, &points) } else { LineCrossings::default() };
         let gain2 = (self.gain)(probe.pixel).powi(2);
         let terrain2 = gain2
             * steps

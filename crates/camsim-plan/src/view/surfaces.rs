@@ -3,6 +3,7 @@
 //! What moves is met where it is at the instant of the ray ([`Surfaces::first_hit_at`]). Rays without an instant,
 //! and all bounds, have it where it is at path time 0.
 
+mod beam;
 mod moving;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use camsim_core::{
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::ir::limits::NEAR_M;
+pub(crate) use beam::Beam;
 use moving::{MovingMeshes, moving_meshes};
 
 /// The surfaces of a scene, prepared for rays.
@@ -28,8 +30,6 @@ pub(crate) struct Surfaces {
     /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them,
     /// and of those that are blended with it. A ray passes through thousands of panes to what is behind them.
     tree: ProximityBvh,
-    /// Box around each mesh.
-    bounds: Vec<Aabb>,
     deep: RayBvh,
     pub solid: RayBvh,
     pub mixed: RayBvh,
@@ -62,6 +62,19 @@ pub(crate) struct SurfaceHit {
     pub normal_ned: DVec3,
     /// The position on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
+}
+
+impl SurfaceHit {
+    fn of_terrain(hit: TerrainHit) -> Self {
+        Self {
+            depth_m: hit.t,
+            surface: 0,
+            uv: hit.uv,
+            tint: DVec3::ONE,
+            normal_ned: hit.normal_ned,
+            terrain: Some(hit),
+        }
+    }
 }
 
 /// Trees of a shape's triangles, in its own axes.
@@ -120,7 +133,6 @@ impl Surfaces {
         Self {
             scene,
             tree,
-            bounds,
             deep,
             solid,
             mixed,
@@ -135,17 +147,6 @@ impl Surfaces {
 
     pub fn terrain(&self) -> Option<&Terrain> {
         self.scene.terrain.as_ref()
-    }
-
-    /// Whether a camera may see anything but ground within `tangents` = [u_min, u_max, v_min, v_max] and so
-    /// far away.
-    pub fn may_show_models(&self, pose: &CameraPose, tangents: [f64; 4], range_m: f64) -> bool {
-        let frustum = Frustum::new(pose, tangents);
-        let measure = |bounds: &Aabb| {
-            (bounds.distance_m(pose.position_ned_m) <= range_m && frustum.may_see(bounds)).then_some(0.0)
-        };
-        let of_mesh = |i: u32| measure(&self.bounds[i as usize]).unwrap_or(f64::INFINITY);
-        self.tree.nearest_item_m(measure, of_mesh) == 0.0
     }
 
     /// Whether there is anything but ground and pictures on it.
@@ -233,17 +234,7 @@ impl Surfaces {
             self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
         let on_mesh = self.model_hit_in(tree, origin_ned_m, direction_ned, limit);
-        let on_ground = || {
-            ground.map(|hit| SurfaceHit {
-                depth_m: hit.t,
-                surface: 0,
-                uv: hit.uv,
-                tint: DVec3::ONE,
-                normal_ned: hit.normal_ned,
-                terrain: Some(hit),
-            })
-        };
-        on_mesh.or_else(on_ground)
+        on_mesh.or_else(|| ground.map(SurfaceHit::of_terrain))
     }
 
     /// The boxes are met in the shape's own axes, the triangles where they stand: what is found there is the
@@ -272,7 +263,7 @@ impl Surfaces {
         let (origin, direction) =
             (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
         let meet = |triangle: u32, limit: f64| {
-            let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+            let corners = mesh.shape.triangle(triangle);
             let points = corners.map(|corner| mesh.position_ned_m(corner));
             let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
             mesh.is_visible(corners, weights, direction_ned).then_some((t, (corners, weights)))

@@ -1,9 +1,9 @@
 //! Ray and distance queries on the full surface, in f64.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::{
-    Terrain, cell_triangles,
+    Terrain, TerrainTriangle, cell_triangles,
     tree::{BLOCK_CELLS, BlockNode},
 };
 use crate::pose::CameraPose;
@@ -173,22 +173,79 @@ impl Terrain {
         direction: DVec3,
         t_max: f64,
     ) -> Option<TerrainHit> {
-        let chunk = &self.chunks[chunk_index as usize];
-        let mut best = None;
-        let mut limit = t_max;
-        for (half, corners) in (0..).zip(cell_triangles(cell)) {
-            let point = |k: usize| self.position_ned_m(chunk_index, corners[k][0], corners[k][1]);
-            let points = [point(0), point(1), point(2)];
-            let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
-            limit = t;
-            let uvs = corners
-                .map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
-            let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
-            let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
-            let normal_ned = if normal.z > 0.0 { -normal } else { normal };
-            best = Some(TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell, half });
+        let mut best: Option<TerrainHit> = None;
+        for half in 0..2 {
+            let points = self.corners_ned_m(chunk_index, cell, half);
+            let limit = best.map_or(t_max, |hit| hit.t);
+            let hit = intersect_triangle(points, origin, direction, limit);
+            best = hit.map(|(t, weights)| self.hit([chunk_index, half], cell, points, t, weights)).or(best);
         }
         best
+    }
+
+    /// Corners of a triangle of a cell, NED, metres; not finite where one is a void.
+    fn corners_ned_m(&self, chunk: u32, cell: [u32; 2], half: u32) -> [DVec3; 3] {
+        cell_triangles(cell)[half as usize].map(|[i, j]| self.position_ned_m(chunk, i, j))
+    }
+
+    /// The hit of a ray on a triangle with these corners.
+    fn hit(
+        &self,
+        [chunk_index, half]: [u32; 2],
+        cell: [u32; 2],
+        corners_ned_m: [DVec3; 3],
+        t: f64,
+        weights: [f64; 3],
+    ) -> TerrainHit {
+        let (chunk, [a, b, c]) = (&self.chunks[chunk_index as usize], corners_ned_m);
+        let uvs = cell_triangles(cell)[half as usize]
+            .map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
+        let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal_ned = if normal.z > 0.0 { -normal } else { normal };
+        TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell, half }
+    }
+
+    /// The hit of a ray on a triangle of [`Self::triangles_in`].
+    #[must_use]
+    pub fn hit_on(&self, triangle: TerrainTriangle, t: f64, weights: [f64; 3]) -> TerrainHit {
+        let (chunk, cell) = self.chunk_of_cell(triangle.cell);
+        let points = self.corners_ned_m(chunk, cell, triangle.half);
+        self.hit([chunk, triangle.half], cell, points, t, weights)
+    }
+
+    /// Triangles of the full surface that may be within a frustum, with their corners, from blocks in no
+    /// particular order; `None` of more than `most_blocks` blocks of 4x4 cells.
+    pub fn triangles_in(
+        &self,
+        frustum: &Frustum,
+        most_blocks: usize,
+    ) -> Option<Vec<(TerrainTriangle, [DVec3; 3])>> {
+        let mut blocks = Vec::new();
+        let mut stack = vec![self.tree.root()];
+        while let Some(node) = stack.pop().filter(|_| blocks.len() <= most_blocks) {
+            if frustum.may_see(&self.tree.bounds(node)) {
+                if node.level == 0 {
+                    blocks.push(node.at);
+                }
+                stack.extend(self.tree.children(node));
+            }
+        }
+        let of_block = |block: [u32; 2]| {
+            let [columns, rows] = [0, 1].map(|k| {
+                let first = block[k] * BLOCK_CELLS;
+                first..self.cells[k].min(first + BLOCK_CELLS)
+            });
+            let cells = rows.flat_map(move |row| columns.clone().map(move |column| [column, row]));
+            cells.flat_map(|cell| [0, 1].map(|half| TerrainTriangle { cell, half }))
+        };
+        let seen = |triangle: TerrainTriangle| {
+            let (chunk, cell) = self.chunk_of_cell(triangle.cell);
+            let corners = self.corners_ned_m(chunk, cell, triangle.half);
+            frustum.may_see_triangle(corners).then_some((triangle, corners))
+        };
+        (blocks.len() <= most_blocks)
+            .then(|| blocks.into_iter().flat_map(of_block).filter_map(seen).collect())
     }
 }
 
@@ -208,45 +265,82 @@ fn passes(corners: [DVec2; 4]) -> bool {
 
 /// Ray parameter in 0..=`t_max` and barycentric weights of the intersection of a ray with a triangle, from
 /// either side. Triangles with corners that are not finite are never hit.
-///
-/// The test uses signed volumes over the edges, seen from the ray's origin. Swapping the ends of an edge
-/// exactly negates its volume in floating point, so two triangles agree on which side of their common edge a
-/// ray passes. Where several edges meet, rounding could still open a gap, so triangles are enlarged by the
-/// rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
 pub fn intersect_triangle(
     points: [DVec3; 3],
     origin: DVec3,
     direction: DVec3,
     t_max: f64,
 ) -> Option<(f64, [f64; 3])> {
-    /// At most 18 products and sums with eps / 2 each, plus a reserve.
-    const ROUNDING: f64 = 4e-15;
-    let (a, b, c) = (points[0] - origin, points[1] - origin, points[2] - origin);
-    let (wa, wb, wc) = (direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a)));
-    let sum = wa + wb + wc;
-    let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
-    let slack = ROUNDING * reach * reach * direction.abs().max_element();
-    let lowest = if sum > 0.0 { wa.min(wb).min(wc) } else { -wa.max(wb).max(wc) };
-    // NaN is a miss.
-    if !(lowest >= -slack && sum.abs() > 3.0 * slack) {
-        return None;
+    SeenTriangle::new(points, origin).intersect(direction, t_max)
+}
+
+/// A triangle as rays from one point see it.
+///
+/// The test uses signed volumes over the edges, seen from the rays' origin. Swapping the ends of an edge
+/// exactly negates its volume in floating point, so two triangles agree on which side of their common edge a
+/// ray passes. Where several edges meet, rounding could still open a gap, so triangles are enlarged by the
+/// rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
+#[derive(Clone, Copy, Debug)]
+pub struct SeenTriangle {
+    /// Products of the ends of the edges opposite to each corner.
+    edges: [DVec3; 3],
+    normal: DVec3,
+    /// Distance of its plane from the origin, times the length of the normal.
+    distance: f64,
+    /// Largest rounding error of the volumes, for a direction whose largest coordinate is 1.
+    rounding: f64,
+}
+
+impl SeenTriangle {
+    /// The triangle with these corners, from the rays' origin.
+    #[inline]
+    #[must_use]
+    pub fn new(points: [DVec3; 3], origin: DVec3) -> Self {
+        /// At most 18 products and sums with eps / 2 each, plus a reserve.
+        const ROUNDING: f64 = 4e-15;
+        let [a, b, c] = points.map(|point| point - origin);
+        let normal = (b - a).cross(c - a);
+        let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
+        Self {
+            edges: [c.cross(b), a.cross(c), b.cross(a)],
+            normal,
+            distance: a.dot(normal),
+            rounding: ROUNDING * reach * reach,
+        }
     }
-    let normal = (b - a).cross(c - a);
-    let t = a.dot(normal) / direction.dot(normal);
-    (t >= 0.0 && t <= t_max).then(|| (t, [wa / sum, wb / sum, wc / sum]))
+
+    /// Ray parameter in 0..=`t_max` and barycentric weights of the intersection with a ray.
+    #[inline]
+    #[must_use]
+    pub fn intersect(&self, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
+        let [wa, wb, wc] = self.edges.map(|edge| direction.dot(edge));
+        let sum = wa + wb + wc;
+        let slack = self.rounding * direction.abs().max_element();
+        let lowest = if sum > 0.0 { wa.min(wb).min(wc) } else { -wa.max(wb).max(wc) };
+        // NaN is a miss.
+        if !(lowest >= -slack && sum.abs() > 3.0 * slack) {
+            return None;
+        }
+        let t = self.distance / direction.dot(self.normal);
+        (t >= 0.0 && t <= t_max).then(|| (t, [wa / sum, wb / sum, wc / sum]))
+    }
 }
 
 /// The half-spaces of a camera's view frustum.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Frustum {
-    position_ned_m: DVec3,
-    /// Inward normals, NED.
-    normals: [DVec3; 5],
+    /// Inward normals, and the least product of each with a position inside.
+    planes: [(DVec3, f64); 6],
 }
 
 impl Frustum {
     /// `tangents` are u_min, u_max, v_min, v_max.
     pub fn new(camera: &CameraPose, tangents: [f64; 4]) -> Self {
+        Self::up_to(camera, tangents, f64::INFINITY)
+    }
+
+    /// The frustum as far as a planar depth.
+    pub fn up_to(camera: &CameraPose, tangents: [f64; 4], depth_m: f64) -> Self {
         let [u_min, u_max, v_min, v_max] = tangents;
         let in_camera = [
             DVec3::new(1.0, 0.0, -u_min),
@@ -254,12 +348,34 @@ impl Frustum {
             DVec3::new(0.0, 1.0, -v_min),
             DVec3::new(0.0, -1.0, v_max),
             DVec3::Z,
+            DVec3::NEG_Z,
         ];
-        Self { position_ned_m: camera.position_ned_m, normals: in_camera.map(|n| camera.ned_from_camera * n) }
+        let mut planes = in_camera.map(|normal| {
+            let normal = camera.ned_from_camera * normal;
+            (normal, normal.dot(camera.position_ned_m))
+        });
+        planes[5].1 -= depth_m;
+        Self { planes }
+    }
+
+    /// The frustum in the axes of a shape, which `turn` and `shift` place.
+    #[must_use]
+    pub fn in_shape(&self, turn: DMat3, shift: DVec3) -> Self {
+        Self {
+            planes: self.planes.map(|(normal, least)| (turn.transpose() * normal, least - normal.dot(shift))),
+        }
     }
 
     /// False only if the whole box is out of sight.
     pub fn may_see(&self, bounds: &super::Aabb) -> bool {
-        !bounds.is_empty() && self.normals.iter().all(|&n| bounds.support(n) >= n.dot(self.position_ned_m))
+        !bounds.is_empty() && self.planes.iter().all(|&(normal, least)| bounds.support(normal) >= least)
+    }
+
+    /// False only if the whole triangle is out of sight.
+    #[must_use]
+    pub fn may_see_triangle(&self, corners: [DVec3; 3]) -> bool {
+        let is_within =
+            |&(normal, least): &(DVec3, f64)| corners.iter().any(|corner| normal.dot(*corner) >= least);
+        self.planes.iter().all(is_within)
     }
 }

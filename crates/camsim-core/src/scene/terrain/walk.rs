@@ -16,9 +16,9 @@ const MOST_STEPS: u32 = 24;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainTriangle {
     /// Cell of the full grid, from the west and from the north.
-    cell: [u32; 2],
+    pub(super) cell: [u32; 2],
     /// Which triangle of the cell, in the order of [`cell_triangles`].
-    half: u32,
+    pub(super) half: u32,
 }
 
 /// The triangle across an edge.

@@ -26,13 +26,13 @@ struct Board {
     others: Vec<Mesh>,
     exposure_ms: f64,
     gain: f64,
-    by_halves: bool,
+    by_quarters: bool,
 }
 
 const BOARD: Board =
-    Board { side_px: 200.0, others: Vec::new(), exposure_ms: 0.0, gain: 1.0, by_halves: false };
+    Board { side_px: 200.0, others: Vec::new(), exposure_ms: 0.0, gain: 1.0, by_quarters: false };
 
-fn found(Board { side_px, others, exposure_ms, gain, by_halves }: Board, key_s: f64) -> f64 {
+fn found(Board { side_px, others, exposure_ms, gain, by_quarters }: Board, key_s: f64) -> f64 {
     let black = Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear));
     let board = Mesh::level_picture(black, DVec3::new(0.0, 0.0, -50.0), 100.0 * side_px / FOCAL_PX);
     let scene = Scene { meshes: [vec![board], others].concat(), sky_linear: [1.0; 3], ..Scene::default() };
@@ -53,8 +53,12 @@ fn found(Board { side_px, others, exposure_ms, gain, by_halves }: Board, key_s: 
         };
         search.neighbourhoods().skyline
     };
-    let half = |odd: bool| skyline(&reach.with_half_the_probes(odd));
-    let found = if by_halves { half(false).and(half(true)) } else { skyline(&reach) };
+    let of_quarters = || {
+        let quarters = [[false, false], [true, false], [false, true], [true, true]];
+        let found = quarters.map(|of| skyline(&reach.with_a_quarter_of_the_probes(of)));
+        found.into_iter().reduce(Skyline::and).unwrap()
+    };
+    let found = if by_quarters { of_quarters() } else { skyline(&reach) };
     let key_pose = path.pose(key_s);
     // Ten times as near as it is: looked for there, the border that has come nearer to the
     // sky is not found.
@@ -74,11 +78,11 @@ fn strips_at_a_displaced_skyline_are_predicted_at_any_width() {
         // to the reach.
         let wrong_px =
             (all_of(width_px) + gone(width_px)) * width_px.max(1.0) / (width_px.max(1.0) + path_px);
-        for by_halves in [false, true] {
+        for by_quarters in [false, true] {
             let sides_px = [150.0, 171.0, 190.0, 203.0, 222.0, 240.0, 261.0];
             let ratios = sides_px.map(|side_px| {
                 let expected = margins::SKYLINE * margins::SKYLINE * side_px * 2.0 * wrong_px / 120_000.0;
-                let found = |key_s| found(Board { side_px, exposure_ms, by_halves, ..BOARD }, key_s);
+                let found = |key_s| found(Board { side_px, exposure_ms, by_quarters, ..BOARD }, key_s);
                 (found(key_s) + found(-key_s)) / expected
             });
             let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;

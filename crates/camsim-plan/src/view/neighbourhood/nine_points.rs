@@ -8,13 +8,16 @@ use glam::DVec2;
 
 use super::search::{LINES, NeighbourhoodSearch};
 use crate::ir::margins;
-use crate::view::{probes::Probe, surfaces::SurfaceHit};
+use crate::view::{
+    probes::Probe,
+    surfaces::{Beam, SurfaceHit},
+};
 
 /// Two of the points.
-pub(super) type Pair = [usize; 2];
+pub(crate) type Pair = [usize; 2];
 
 /// What the points see at the probe's own instant.
-pub(super) struct NinePoints<'a> {
+pub(crate) struct NinePoints<'a> {
     search: &'a NeighbourhoodSearch<'a>,
     pub probe: &'a Probe,
     pub mid_s: f64,
@@ -22,6 +25,8 @@ pub(super) struct NinePoints<'a> {
     positions: [DVec2; 9],
     hits: [Option<SurfaceHit>; 9],
     inverse_depth: [f64; 9],
+    /// Rays among the points.
+    pub beam: Beam<'a>,
 }
 
 impl<'a> NinePoints<'a> {
@@ -31,11 +36,22 @@ impl<'a> NinePoints<'a> {
         let pose = search.path.pose(mid_s);
         let positions: [DVec2; 9] =
             std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
-        let mut points =
-            Self { search, probe, mid_s, pose, positions, hits: [None; 9], inverse_depth: [0.0; 9] };
-        points.hits = positions.map(|position| points.cast(position));
-        points.inverse_depth = points.hits.map(|hit| hit.map_or(0.0, |hit| hit.depth_m.recip()));
-        points
+        let uv = |position: DVec2| probe.uv + probe.uv_from_px * (f64::from(NEAR_PX) * position);
+        let ray_ned = |position: DVec2| pose.ned_from_camera * uv(position).extend(1.0);
+        let cast = |i: usize| search.surfaces.first_hit(pose.position_ned_m, ray_ned(positions[i]));
+        // The middle and the corners say how far away is what all others mostly meet.
+        let cornered: [Option<SurfaceHit>; 5] = std::array::from_fn(|k| cast(2 * k));
+        let depth_m = |hit: &Option<SurfaceHit>| hit.map_or(f64::INFINITY, |hit| hit.depth_m);
+        let farthest_m = cornered.iter().map(depth_m).fold(0.0, f64::max);
+        let uvs = positions.map(uv);
+        let (low, high) = uvs.iter().fold((uvs[0], uvs[0]), |(low, high), uv| (low.min(*uv), high.max(*uv)));
+        let beam = search.surfaces.beam(&pose, [low.x, high.x, low.y, high.y], margins::BEHIND * farthest_m);
+        let hits = std::array::from_fn(|i| match i % 2 {
+            0 => cornered[i / 2],
+            _ => beam.first_hit(ray_ned(positions[i])),
+        });
+        let inverse_depth = hits.map(|hit: Option<SurfaceHit>| hit.map_or(0.0, |hit| hit.depth_m.recip()));
+        Self { search, probe, mid_s, pose, positions, hits, inverse_depth, beam }
     }
 
     fn uv(&self, position: DVec2) -> DVec2 {
@@ -44,7 +60,7 @@ impl<'a> NinePoints<'a> {
 
     fn cast(&self, position: DVec2) -> Option<SurfaceHit> {
         let ray_ned = self.pose.ned_from_camera * self.uv(position).extend(1.0);
-        self.search.surfaces.first_hit(self.pose.position_ned_m, ray_ned)
+        self.beam.first_hit(ray_ned)
     }
 
     /// Neighbours along rows, columns and diagonals with a step of depth between them.
@@ -112,19 +128,5 @@ impl<'a> NinePoints<'a> {
             .zip(self.inverse_depth)
             .fold(DVec2::ZERO, |sum, (position, nearness)| sum + nearness * *position);
         (self.search.reach.camera.central_focal_px() * (self.probe.uv_from_px * towards)).normalize_or_zero()
-    }
-
-    /// Whether models may be seen among the points. Lines through the probe are for models, which may be
-    /// narrower than the distance of the points; where the terrain steps, lines count how often.
-    pub fn may_show_models(&self) -> bool {
-        let rays = self.positions.map(|position| self.uv(position));
-        let (low, high) =
-            rays.iter().fold((rays[0], rays[0]), |(low, high), uv| (low.min(*uv), high.max(*uv)));
-        let range_m = |(uv, hit): (&DVec2, &Option<SurfaceHit>)| {
-            hit.map_or(f64::INFINITY, |hit| hit.depth_m * uv.extend(1.0).length())
-        };
-        let farthest_m = rays.iter().zip(&self.hits).map(range_m).fold(0.0, f64::max);
-        let tangents = [low.x, high.x, low.y, high.y];
-        self.search.surfaces.may_show_models(&self.pose, tangents, margins::BEHIND * farthest_m)
     }
 }

@@ -61,7 +61,7 @@ fn lines_are_skipped_only_where_they_cross_nothing() {
             };
             let neighbourhoods = search.neighbourhoods().of_probes;
             for (number, (probe, neighbourhood)) in reach.probes.iter().zip(&neighbourhoods).enumerate() {
-                let crossings = search.line_crossings(number, probe);
+                let crossings = search.line_crossings(number, &NinePoints::new(&search, probe));
                 assert_eq!(neighbourhood.crossings, crossings, "{up_deg} {frame}: {:?}", probe.pixel);
                 left_out += usize::from(crossings == LineCrossings::default());
                 found += usize::from(crossings != LineCrossings::default());

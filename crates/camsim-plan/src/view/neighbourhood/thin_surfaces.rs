@@ -14,14 +14,13 @@ use std::{
 };
 
 use camsim_core::{
-    pose::CameraPose,
     silhouette::{bends, may_step, steps},
     temporal::edge_mask::FINE_EDGE_STEP,
 };
 use glam::DVec2;
 
-use super::search::NeighbourhoodSearch;
-use crate::view::{light::RayLight, probes::Probe, surfaces::SurfaceHit};
+use super::{nine_points::NinePoints, search::NeighbourhoodSearch};
+use crate::view::{light::RayLight, surfaces::SurfaceHit};
 
 /// Points along each of the two lines, and how far they are apart: far houses have borders nearer to each
 /// other than a pixel.
@@ -79,20 +78,17 @@ const DIAGONAL: [DVec2; 2] = [DVec2::splat(FRAC_1_SQRT_2), DVec2::new(FRAC_1_SQR
 impl NeighbourhoodSearch<'_> {
     /// What two lines through a probe cross, at its own instant; probes take turns in the directions of line by
     /// their number.
-    pub fn line_crossings(&self, number: usize, probe: &Probe) -> LineCrossings {
-        let [x, y] = probe.pixel;
-        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
-        let pose = self.path.pose(mid_s);
+    pub fn line_crossings(&self, number: usize, points: &NinePoints<'_>) -> LineCrossings {
         let mut sums = CrossingSums::default();
         for axis in if number.is_multiple_of(2) { UPRIGHT } else { DIAGONAL } {
-            PointLine::new(self, probe, pose, axis).add_to(&mut sums);
+            PointLine::new(self, points, axis).add_to(&mut sums);
         }
         let CrossingSums { count, contrast2, touching2, creases2, on_terrain2, at_pixel_spacing2 } = sums;
         if count == 0 && touching2 + creases2 + on_terrain2 == 0.0 {
             return LineCrossings::default();
         }
         let length_px = 2.0 * APART_PX * (POINTS - 1) as f64;
-        let gain2 = (self.gain)(probe.pixel).powi(2);
+        let gain2 = (self.gain)(points.probe.pixel).powi(2);
         let of_area = |contrast2: f64| FRAC_PI_2 * contrast2 / length_px * gain2;
         LineCrossings {
             count,
@@ -119,8 +115,7 @@ struct CrossingSums {
 /// Points along a line through a probe.
 struct PointLine<'a> {
     search: &'a NeighbourhoodSearch<'a>,
-    probe: &'a Probe,
-    pose: CameraPose,
+    points: &'a NinePoints<'a>,
     axis: DVec2,
     hits: [Option<SurfaceHit>; POINTS],
     inverse_depths: [f64; POINTS],
@@ -129,30 +124,29 @@ struct PointLine<'a> {
 }
 
 impl<'a> PointLine<'a> {
-    fn new(search: &'a NeighbourhoodSearch<'a>, probe: &'a Probe, pose: CameraPose, axis: DVec2) -> Self {
+    fn new(search: &'a NeighbourhoodSearch<'a>, points: &'a NinePoints<'a>, axis: DVec2) -> Self {
         let lights = std::array::from_fn(|_| OnceCell::new());
         let (hits, inverse_depths) = ([None; POINTS], [0.0; POINTS]);
-        let mut line = Self { search, probe, pose, axis, hits, inverse_depths, lights };
+        let mut line = Self { search, points, axis, hits, inverse_depths, lights };
         line.hits = std::array::from_fn(|k| line.cast(k as f64));
         line.inverse_depths = line.hits.map(|hit| hit.map_or(0.0, |hit| hit.depth_m.recip()));
         line
     }
 
     fn uv(&self, along: f64) -> DVec2 {
-        let Self { probe, axis, .. } = self;
+        let Self { points: NinePoints { probe, .. }, axis, .. } = self;
         probe.uv + probe.uv_from_px * (APART_PX * (along - 0.5 * (POINTS - 1) as f64) * *axis)
     }
 
     fn cast(&self, along: f64) -> Option<SurfaceHit> {
-        let ray_ned = self.pose.ned_from_camera * self.uv(along).extend(1.0);
-        self.search.surfaces.first_hit(self.pose.position_ned_m, ray_ned)
+        self.points.beam.first_hit(self.points.pose.ned_from_camera * self.uv(along).extend(1.0))
     }
 
     fn light(&self, k: usize) -> &RayLight {
         self.lights[k].get_or_init(|| {
             let ray = self.uv(k as f64).extend(1.0);
-            let ray_ned = self.pose.ned_from_camera * ray;
-            let origin = self.pose.position_ned_m;
+            let ray_ned = self.points.pose.ned_from_camera * ray;
+            let origin = self.points.pose.position_ned_m;
             self.search.surfaces.light(origin, ray_ned, self.hits[k].as_ref(), ray.length())
         })
     }

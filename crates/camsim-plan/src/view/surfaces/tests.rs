@@ -24,20 +24,53 @@ fn scene() -> Scene {
 }
 
 #[test]
-fn models_are_found_only_within_view_and_range() {
+fn beams_show_models_only_within_view_and_range() {
     let surfaces = Surfaces::new(Arc::new(scene()));
     let above =
         CameraPose { position_ned_m: DVec3::new(0.0, 10.0, -300.0), ned_from_camera: DQuat::IDENTITY };
-    let tangents = |north: f64| [north - 0.01, north + 0.01, -0.01, 0.01];
+    let shows = |north: f64, depth_m: f64| {
+        surfaces.beam(&above, [north - 0.01, north + 0.01, -0.01, 0.01], depth_m).may_show_models()
+    };
     // Straight down there is one 240 m below; between two of them, and to the side, is ground alone.
-    assert!(
-        surfaces.may_show_models(&above, tangents(0.0), 241.0)
-            && !surfaces.may_show_models(&above, tangents(0.0), 200.0)
-    );
-    assert!(
-        !surfaces.may_show_models(&above, tangents(0.19), f64::INFINITY)
-            && !surfaces.may_show_models(&above, tangents(3.0), f64::INFINITY)
-    );
+    assert!(shows(0.0, 241.0) && !shows(0.0, 200.0));
+    assert!(!shows(0.19, f64::INFINITY) && !shows(3.0, f64::INFINITY));
+}
+
+#[test]
+fn rays_of_a_beam_hit_what_they_hit_alone() {
+    let mut scene = scene();
+    // Not level, so that no two triangles meet a ray at the same depth.
+    scene.meshes[2].ned_from_shape = DMat3::from_rotation_x(0.4) * 1.3;
+    // Pressed flat: there is no way back to the shape's axes.
+    scene.meshes[0].ned_from_shape =
+        DMat3::from_rotation_y(0.1) * DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.0));
+    let surfaces = Surfaces::new(Arc::new(scene));
+    let (mut met, mut sky, mut of_mesh) = (0, 0, 0);
+    for k in 0..600 {
+        let part = |step: f64| (f64::from(k) * step).fract();
+        let position_ned_m =
+            DVec3::new(300.0 * part(0.618) - 150.0, 100.0 * part(0.755) - 50.0, -40.0 - 60.0 * part(0.325));
+        let ned_from_camera =
+            DQuat::from_euler(EulerRot::ZYX, 6.3 * part(0.57), 1.7 * part(0.31), part(0.83));
+        let pose = CameraPose { position_ned_m, ned_from_camera };
+        let (u, v, width) = (part(0.41) - 0.5, part(0.23) - 0.5, [0.002, 0.02, 0.2][k as usize % 3]);
+        let depth_m = [20.0, 80.0, 500.0, f64::INFINITY][k as usize % 4];
+        let beam = surfaces.beam(&pose, [u, u + width, v, v + width], depth_m);
+        for n in 0..25 {
+            let [du, dv] = [n % 5, n / 5].map(|step| f64::from(step) / 4.0 * width);
+            let ray_ned = ned_from_camera * DVec3::new(u + du, v + dv, 1.0);
+            let [alone, within] = [surfaces.first_hit(position_ned_m, ray_ned), beam.first_hit(ray_ned)];
+            let of = |hit: Option<SurfaceHit>| hit.map(|hit| (hit.depth_m, hit.surface));
+            assert_eq!(of(alone), of(within), "{k} {n}");
+            let is_mesh = alone.is_some_and(|hit| hit.surface > 0);
+            (met, sky, of_mesh) = (
+                met + u32::from(alone.is_some()),
+                sky + u32::from(alone.is_none()),
+                of_mesh + u32::from(is_mesh),
+            );
+        }
+    }
+    assert!(met > 5000 && sky > 500 && of_mesh > 1000, "{met} {sky} {of_mesh}");
 }
 
 #[test]
