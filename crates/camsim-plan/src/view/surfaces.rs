@@ -130,19 +130,7 @@ impl Surfaces {
         let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
         let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
         let blends = scene.has_blended();
-        Self {
-            scene,
-            tree,
-            deep,
-            solid,
-            mixed,
-            moving,
-            deep_still,
-            shapes,
-            shape_from_ned,
-            blends,
-            linear,
-        }
+        Self { scene, tree, deep, solid, mixed, moving, deep_still, shapes, shape_from_ned, blends, linear }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {

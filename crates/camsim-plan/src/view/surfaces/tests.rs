@@ -23,9 +23,16 @@ fn scene() -> Scene {
     }
 }
 
+/// The scene with a triangle more in each picture, which makes it a model.
+fn models() -> Scene {
+    let mut scene = scene();
+    scene.meshes.iter_mut().for_each(|mesh| Arc::make_mut(&mut mesh.shape).indices.extend([0, 1, 2]));
+    scene
+}
+
 #[test]
 fn beams_show_models_only_within_view_and_range() {
-    let surfaces = Surfaces::new(Arc::new(scene()));
+    let surfaces = Surfaces::new(Arc::new(models()));
     let above =
         CameraPose { position_ned_m: DVec3::new(0.0, 10.0, -300.0), ned_from_camera: DQuat::IDENTITY };
     let shows = |north: f64, depth_m: f64| {
@@ -38,7 +45,7 @@ fn beams_show_models_only_within_view_and_range() {
 
 #[test]
 fn rays_of_a_beam_hit_what_they_hit_alone() {
-    let mut scene = scene();
+    let mut scene = models();
     // Not level, so that no two triangles meet a ray at the same depth.
     scene.meshes[2].ned_from_shape = DMat3::from_rotation_x(0.4) * 1.3;
     // Pressed flat: there is no way back to the shape's axes.
