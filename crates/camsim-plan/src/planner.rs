@@ -362,7 +362,7 @@ impl Planner {
         let inputs = &self.of_face(plan).inputs;
         let context = FrameContext::new(inputs, plan.frame, None)?;
         let quarter = plan.shared_frames.and_then(|_| inputs.quarter_of_the_probes(plan.frame));
-        let reach = quarter.unwrap_or_else(|| context.reach.clone());
+        let reach = quarter.unwrap_or_else(|| context.dry_run_reach.clone());
         let ideal = tried_ideal(&context, plan);
         // Of several ideal frames the prediction has the one in the middle of the window.
         let (key_s, key_pose) = match plan.keys.as_slice() {

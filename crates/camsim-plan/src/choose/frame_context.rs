@@ -55,6 +55,9 @@ pub(crate) struct FrameContext<'a> {
     pub window_s: [f64; 2],
     pub zoom: Option<f64>,
     pub reach: Arc<LensReach>,
+    /// The lens with the probes at which the pipeline is run dry: a quarter of them where other frames are made from
+    /// the same ideal frame.
+    pub dry_run_reach: Arc<LensReach>,
     /// The ideal frame that others are made from too, if this one is to be.
     pub shared: Option<&'a SharedIdeal>,
     /// Frames that have a quarter of the probes each, and share what they find; none if this one has all.
@@ -127,6 +130,7 @@ impl<'a> FrameContext<'a> {
             shutter,
             window_s,
             zoom,
+            dry_run_reach: inputs.fixed.clone().filter(|_| shared.is_none()).unwrap_or_else(|| reach.clone()),
             reach,
             shared,
             company,

@@ -194,7 +194,7 @@ impl<'a> Draft<'a> {
         let resampling = scene.texture_probes.expected(&picture.plan, blur);
         let others_dn = resampling.total_dn().hypot(picture.silhouettes_dn()).hypot(scene.blended_dn());
         TemporalTask {
-            reach: &context.reach,
+            reach: &context.dry_run_reach,
             sequence: &inputs.sequence,
             shutter: &context.shutter,
             surfaces: &inputs.scene.surfaces,
