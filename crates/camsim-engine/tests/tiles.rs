@@ -84,7 +84,7 @@ fn tiles_show_what_one_texture_does() {
     // Straight down over so much ground that tiles make room for others, and for some of them again.
     let far: &[u64] = &[0, 6, 12, 16, 1];
     for (max_error_dn, pitch_deg, frames) in
-        [(16.0, -90.0, far), (0.05, -12.0, &[0, 6]), (1.5, -60.0, &[6]), (1.0, -45.0, &[6])]
+        [(16.0, -90.0, far), (1.5, -20.0, &[0, 6]), (0.6, -60.0, &[6]), (1.0, -45.0, &[6])]
     {
         let sequence = flight(&ground, max_error_dn, pitch_deg);
         let (whole, reads, none) = ideal_frames(&sequence, None, frames);
