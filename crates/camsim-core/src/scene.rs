@@ -18,6 +18,7 @@ pub mod motion;
 mod prefilter;
 pub mod proximity_bvh;
 pub mod ray_bvh;
+pub mod ray_packet;
 pub mod terrain;
 pub mod texture;
 mod texture_tiles;

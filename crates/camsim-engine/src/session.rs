@@ -438,13 +438,15 @@ impl<'a> Session<'a> {
             self.scene_planner.is_some() || self.channels.iter().any(|channel| channel.needs_every_ray());
         if !needs_every_ray {
             if plan.has_exact_truth() {
-                hits::complete(truth, color_rgba, plan, &rays);
+                hits::of_all_pixels(truth, color_rgba, plan, &rays, None);
             }
             return Ok(Vec::new());
         }
         // With the paper's solvers depth and coordinates say where these look.
         let mut solved = (!plan.has_exact_truth()).then(|| truth.clone());
-        hits::of_all_pixels(solved.as_mut().unwrap_or(truth), color_rgba, plan, &rays, &mut hits);
+        hits.clear();
+        hits.resize(truth.len(), None);
+        hits::of_all_pixels(solved.as_mut().unwrap_or(truth), color_rgba, plan, &rays, Some(&mut hits));
         let pixels = FramePixels { planner, plan, rays: &rays, truth, color_rgba, hits: &hits };
         let planes = planes(&pixels, &self.channels);
         self.hits = hits;

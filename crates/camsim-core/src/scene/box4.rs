@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec3, Vec4};
 
-use super::Aabb;
+use super::{Aabb, ray_packet::Beam};
 
 /// Bounds on single-precision rounding: of a sum of coordinates relative to the largest one, and of a ray
 /// parameter.
@@ -23,6 +23,14 @@ pub(super) struct BoxRay {
     inverse: [f32; 3],
     /// Amount by which boxes are enlarged.
     slack_m: f32,
+}
+
+/// A beam prepared for box tests.
+pub(super) struct BeamBox {
+    /// Normals and bounds of its half-spaces.
+    sides: [([f32; 3], f32); 5],
+    forward: [f32; 3],
+    start: f32,
 }
 
 impl Box4 {
@@ -53,6 +61,36 @@ impl Box4 {
         }
         let is_met = (enter * (1.0 - WIDER)).cmple(exit * (1.0 + WIDER)) & self.min[0].cmple(self.max[0]);
         (enter * (1.0 - WIDER), is_met.bitmask())
+    }
+
+    /// Least distance of each box along a beam, and a bit mask of the boxes that it may meet up to `limit_m`.
+    pub fn meet(&self, beam: &BeamBox, limit_m: f32) -> (Vec4, u32) {
+        let mut is_met = self.min[0].cmple(self.max[0]);
+        for (normal, least) in &beam.sides {
+            let part = |k: usize| (self.min[k] * normal[k]).max(self.max[k] * normal[k]);
+            is_met &= (part(0) + part(1) + part(2)).cmpge(Vec4::splat(*least));
+        }
+        let part = |k: usize| (self.min[k] * beam.forward[k]).min(self.max[k] * beam.forward[k]);
+        let near = part(0) + part(1) + part(2) - beam.start;
+        (near, (is_met & near.cmple(Vec4::splat(limit_m))).bitmask())
+    }
+}
+
+impl BeamBox {
+    /// For boxes relative to `middle` with coordinates up to `extent_m`.
+    pub fn new(beam: &Beam, middle: DVec3, extent_m: f64) -> Self {
+        // Normals are about as long as axes.
+        let slack = |normal: DVec3| 2.0 * ROUNDING * extent_m * normal.abs().element_sum();
+        let side = |(normal, least): (DVec3, f64)| {
+            (normal.as_vec3().to_array(), down(least - normal.dot(middle) - slack(normal)))
+        };
+        let start = beam.start - beam.forward.dot(middle);
+        let start = start + slack(beam.forward) + ROUNDING * start.abs();
+        Self {
+            sides: beam.sides.map(side),
+            forward: beam.forward.as_vec3().to_array(),
+            start: -down(-start),
+        }
     }
 }
 

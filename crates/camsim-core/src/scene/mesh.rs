@@ -5,7 +5,11 @@ use std::{collections::HashMap, sync::Arc};
 use glam::{DMat3, DVec3};
 
 use super::{
-    Aabb, Light, RigidMotion, RigidState, Texture, light::transformed_normal, terrain::intersect_triangle,
+    Aabb, Light, RigidMotion, RigidState, Texture,
+    light::transformed_normal,
+    ray_bvh::RayBvh,
+    ray_packet::{Faces, PacketSurface, RayPacket},
+    terrain::intersect_triangle,
     texture::Wrap,
 };
 
@@ -324,6 +328,35 @@ impl Mesh {
             }
         }
         best
+    }
+
+    /// Meets a packet of rays: what each meets first, if that is nearer than what it has met before. The mesh
+    /// stands where it is at path time 0; `triangles` is the tree of its shape's, `surface` its number.
+    pub fn meet_packet(&self, packet: &mut RayPacket, triangles: &RayBvh, surface: u32) {
+        let faces = match (self.material.cutoff, self.material.one_sided) {
+            (Some(_), _) => Faces::Holed,
+            (None, true) => Faces::Front,
+            (None, false) => Faces::Both,
+        };
+        let of = PacketSurface { surface, triangle: None, faces };
+        triangles.meet_packet(packet, (self.ned_from_shape, self.origin_ned_m), &mut |triangle, packet| {
+            crate::simd::with_widest(
+                #[inline(always)]
+                || self.meet_triangle(packet, triangle as usize, of),
+            );
+        });
+    }
+
+    #[inline(always)]
+    fn meet_triangle(&self, packet: &mut RayPacket, triangle: usize, of: PacketSurface) {
+        let corners = [0, 1, 2].map(|k| self.shape.indices[3 * triangle + k]);
+        let points = corners.map(|corner| self.position_ned_m(corner));
+        let (packet_from_ned, origin_ned_m) = packet.axes();
+        packet.meet(points.map(|point| packet_from_ned * (point - origin_ned_m)), of, |ray, limit| {
+            let (t, weights) = intersect_triangle(points, ray.origin_ned_m, ray.direction_ned, limit)?;
+            self.is_visible(corners, weights, ray.direction_ned).then_some(t)
+        });
+        packet.find_farthest();
     }
 
     /// Bounding box in NED (at path time 0); for a rotated shape, that of the rotated box.

@@ -1,11 +1,12 @@
 //! Bounding volume hierarchy for ray queries.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::{
     Aabb,
-    box4::{Box4, BoxRay, down},
+    box4::{BeamBox, Box4, BoxRay, down},
     proximity_bvh::{median_split, union_of},
+    ray_packet::RayPacket,
 };
 
 /// Flag in `holds` of an item; without it the entry is a node.
@@ -134,6 +135,51 @@ impl RayBvh {
             }
         }
         found
+    }
+
+    /// Visits the items that rays of a packet may meet first, approximately front to back. The boxes have axes of
+    /// their own: `x = ned_from_own own + origin`.
+    pub fn meet_packet(
+        &self,
+        packet: &mut RayPacket,
+        (ned_from_own, origin_ned_m): (DMat3, DVec3),
+        meet: &mut dyn FnMut(u32, &mut RayPacket),
+    ) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let beam = packet.beam().in_axes(ned_from_own, origin_ned_m);
+        let beam = BeamBox::new(&beam, self.middle, self.extent_m);
+        let mut limit_m = -down(-packet.farthest_m());
+        let mut waiting = [(f32::NEG_INFINITY, 0_u32); MAX_WAITING];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (near_m, held) = waiting[count];
+            if near_m > limit_m {
+                continue;
+            }
+            if held & ITEM != 0 {
+                meet(held & !ITEM, packet);
+                limit_m = -down(-packet.farthest_m());
+                continue;
+            }
+            let RayBvhNode { boxes, holds } = &self.nodes[held as usize];
+            let (near, mut is_met) = boxes.meet(&beam, limit_m);
+            let first = count;
+            while is_met != 0 {
+                let lane = is_met.trailing_zeros() as usize;
+                is_met &= is_met - 1;
+                // The nearest box is pushed last, so it is popped first.
+                let mut slot = count;
+                while slot > first && waiting[slot - 1].0 < near[lane] {
+                    waiting[slot] = waiting[slot - 1];
+                    slot -= 1;
+                }
+                waiting[slot] = (near[lane], holds[lane]);
+                count += 1;
+            }
+        }
     }
 
     /// First intersection by testing all items.

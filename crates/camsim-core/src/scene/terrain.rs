@@ -22,6 +22,7 @@ mod detail;
 mod drawn_tests;
 mod errors;
 mod lattice;
+mod packet;
 mod placed;
 mod query;
 mod select;

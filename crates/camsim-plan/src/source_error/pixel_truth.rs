@@ -11,12 +11,18 @@ mod tests;
 use camsim_core::{
     mount::CameraPath,
     pose::CameraPose,
-    scene::{TerrainTriangle, TerrainWalk},
+    scene::{
+        TerrainTriangle,
+        ray_packet::{PACKET_RAYS, PacketRay, RayPacket},
+    },
     shutter::RowAxis,
 };
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
-use crate::{ir::frame_plan::FramePlan, view::surfaces::Surfaces};
+use crate::{
+    ir::frame_plan::FramePlan,
+    view::surfaces::{SurfaceHit, Surfaces},
+};
 
 /// What the centre of a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +50,7 @@ pub struct PixelHit {
 }
 
 /// A hit along a ray.
+#[derive(Clone, Copy)]
 struct RayHit {
     depth_m: f64,
     normal_ned: DVec3,
@@ -57,6 +64,18 @@ struct RowCamera {
     /// Path time, seconds.
     t_s: f64,
     pose: CameraPose,
+    ned_from_camera: DMat3,
+    /// To the key camera's axes, and from its position there.
+    key_from_camera: DMat3,
+    shift_key_m: DVec3,
+}
+
+impl RowCamera {
+    fn new(t_s: f64, pose: CameraPose, key: &CameraPose) -> Self {
+        let (key_from_camera, shift_key_m) = pose.relative_to(key);
+        let ned_from_camera = DMat3::from_quat(pose.ned_from_camera);
+        Self { t_s, pose, ned_from_camera, key_from_camera, shift_key_m }
+    }
 }
 
 /// Rays of the pixels of a frame, each at its own instant. The terrain is met at full detail, which what was
@@ -85,7 +104,7 @@ impl<'a> FrameRays<'a> {
             let times = pixels.iter().map(|&[x, y]| {
                 plan.stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y)
             });
-            times.map(|t_s| RowCamera { t_s, pose: path.pose(t_s) }).collect()
+            times.map(|t_s| RowCamera::new(t_s, path.pose(t_s), &plan.key_pose)).collect()
         };
         let at_phase = if phase * shutter.exposure_s() == 0.0 { Vec::new() } else { cameras(phase) };
         Self { path, surfaces, plan, mid: cameras(0.0), at_phase }
@@ -102,20 +121,87 @@ impl<'a> FrameRays<'a> {
     /// What the ray `uv` of a pixel meets.
     #[must_use]
     pub fn cast(&self, pixel: [u32; 2], uv: DVec2) -> PixelTruth {
-        let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let hit = self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned).map(|hit| RayHit {
-            depth_m: hit.depth_m,
-            normal_ned: hit.normal_ned,
-            surface: hit.surface as u32,
-            triangle: self.surfaces.terrain().zip(hit.terrain).map(|(terrain, hit)| hit.triangle_of(terrain)),
-        });
-        self.truth(pixel, uv, hit)
+        let hit = self.first_hit(&self.mid, pixel, uv).map(|hit| self.ray_hit(&hit));
+        let source_px = match self.at_phase.is_empty() {
+            true => self.source_px(&self.mid, pixel, uv, hit.map(|hit| hit.depth_m)),
+            false => self.source_at_phase(pixel, uv),
+        };
+        self.truth(pixel, uv, hit, source_px)
     }
 
-    /// A walk over the terrain from pixel to pixel.
-    #[must_use]
-    pub fn pixel_walk(&self) -> PixelWalk<'_> {
-        PixelWalk { rays: self, walk: None }
+    fn first_hit(&self, rows: &[RowCamera], pixel: [u32; 2], uv: DVec2) -> Option<SurfaceHit> {
+        let (RowCamera { t_s, pose, .. }, ray_ned) = self.ray(rows, pixel, uv);
+        self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned)
+    }
+
+    fn ray_hit(&self, hit: &SurfaceHit) -> RayHit {
+        let SurfaceHit { depth_m, normal_ned, surface, terrain, .. } = *hit;
+        let triangle = self.surfaces.terrain().zip(terrain).map(|(terrain, hit)| hit.triangle_of(terrain));
+        RayHit { depth_m, normal_ned, surface: surface as u32, triangle }
+    }
+
+    /// What the rays of pixels near each other meet, as [`Self::cast`] for each; `found` gets their places among
+    /// the pixels. `packet` is scratch.
+    pub fn cast_packet(
+        &self,
+        packet: &mut RayPacket,
+        pixels: &[Option<([u32; 2], DVec2)>; PACKET_RAYS],
+        mut found: impl FnMut(usize, PixelTruth),
+    ) {
+        let Some(first) = self.hits_of_packet(packet, &self.mid, pixels) else {
+            let each = pixels.iter().enumerate().filter_map(|(i, pixel)| Some((i, (*pixel)?)));
+            return each.for_each(|(i, (pixel, uv))| found(i, self.cast(pixel, uv)));
+        };
+        let at_phase = (!self.at_phase.is_empty()).then(|| self.hits_of_packet(packet, &self.at_phase, pixels));
+        for (i, hit) in first.iter().enumerate() {
+            let Some((pixel, uv)) = pixels[i] else { continue };
+            let source_px = match &at_phase {
+                None => self.source_px(&self.mid, pixel, uv, hit.map(|hit| hit.depth_m)),
+                Some(Some(hits)) => {
+                    self.source_px(&self.at_phase, pixel, uv, hits[i].map(|hit| hit.depth_m))
+                }
+                Some(None) => self.source_at_phase(pixel, uv),
+            };
+            found(i, self.truth(pixel, uv, *hit, source_px));
+        }
+    }
+
+    /// What each ray of a packet meets; `None` for rays that have to be traced alone.
+    fn hits_of_packet(
+        &self,
+        packet: &mut RayPacket,
+        rows: &[RowCamera],
+        pixels: &[Option<([u32; 2], DVec2)>; PACKET_RAYS],
+    ) -> Option<[Option<RayHit>; PACKET_RAYS]> {
+        let mut rays = [NO_RAY; PACKET_RAYS];
+        for (ray, pixel) in rays.iter_mut().zip(pixels) {
+            let Some((pixel, uv)) = *pixel else { continue };
+            let (RowCamera { pose, .. }, direction_ned) = self.ray(rows, pixel, uv);
+            *ray = PacketRay { origin_ned_m: pose.position_ned_m, direction_ned, limit: f64::INFINITY };
+        }
+        if !packet.begin(&rays) {
+            return None;
+        }
+        self.surfaces.meet_still(packet);
+        let mut hits = [None; PACKET_RAYS];
+        for (i, hit) in hits.iter_mut().enumerate() {
+            *hit = packet.hit(i).map(|hit| RayHit {
+                depth_m: hit.t,
+                normal_ned: hit.normal_ned,
+                surface: hit.surface,
+                triangle: hit.triangle,
+            });
+        }
+        if self.surfaces.moves() {
+            for (hit, pixel) in hits.iter_mut().zip(pixels) {
+                let Some((pixel, uv)) = *pixel else { continue };
+                let (RowCamera { t_s, pose, .. }, ray_ned) = self.ray(rows, pixel, uv);
+                let limit = hit.map_or(f64::INFINITY, |hit| hit.depth_m);
+                let moving = self.surfaces.moving_hit_at(*t_s, pose.position_ned_m, ray_ned, limit);
+                *hit = moving.map(|moving| self.ray_hit(&moving)).or(*hit);
+            }
+        }
+        Some(hits)
     }
 
     /// Whether a walk from a triangle that a pixel nearby sees ends at the triangle that this pixel sees: no
@@ -211,19 +297,12 @@ impl<'a> FrameRays<'a> {
     #[inline]
     fn ray<'b>(&self, rows: &'b [RowCamera], pixel: [u32; 2], uv: DVec2) -> (&'b RowCamera, DVec3) {
         let row = &rows[self.line(pixel)];
-        (row, row.pose.ned_from_camera * uv.extend(1.0))
+        (row, row.ned_from_camera * uv.extend(1.0))
     }
 
     #[inline]
-    fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>) -> PixelTruth {
+    fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>, source_px: DVec2) -> PixelTruth {
         let (RowCamera { pose, .. }, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let source_px = if self.at_phase.is_empty() {
-            self.source_px(pose, ray_ned, hit.as_ref().map(|hit| hit.depth_m))
-        } else {
-            let (RowCamera { t_s, pose }, ray_ned) = self.ray(&self.at_phase, pixel, uv);
-            let hit = self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned);
-            self.source_px(pose, ray_ned, hit.map(|hit| hit.depth_m))
-        };
         let hit = hit.map(|RayHit { depth_m, normal_ned, surface, triangle }| PixelHit {
             point_ned_m: pose.position_ned_m + depth_m * ray_ned,
             depth_m,
@@ -234,57 +313,22 @@ impl<'a> FrameRays<'a> {
         PixelTruth { source_px, hit }
     }
 
+    fn source_at_phase(&self, pixel: [u32; 2], uv: DVec2) -> DVec2 {
+        let hit = self.first_hit(&self.at_phase, pixel, uv);
+        self.source_px(&self.at_phase, pixel, uv, hit.map(|hit| hit.depth_m))
+    }
+
     #[inline]
-    fn source_px(&self, pose: &CameraPose, ray_ned: DVec3, depth_m: Option<f64>) -> DVec2 {
-        let key_pose = &self.plan.key_pose;
+    fn source_px(&self, rows: &[RowCamera], pixel: [u32; 2], uv: DVec2, depth_m: Option<f64>) -> DVec2 {
+        let RowCamera { key_from_camera, shift_key_m, .. } = rows[self.line(pixel)];
         // Times the inverse depth, which is 0 for the sky.
-        let shift_ned_m = pose.position_ned_m - key_pose.position_ned_m;
-        let point = ray_ned + depth_m.map_or(DVec3::ZERO, |depth_m| shift_ned_m / depth_m);
-        self.plan.ideal.px_from_point(key_pose.ned_from_camera.conjugate() * point)
+        let shift = depth_m.map_or(DVec3::ZERO, |depth_m| shift_key_m / depth_m);
+        self.plan.ideal.px_from_point(key_from_camera * uv.extend(1.0) + shift)
     }
 }
 
-/// A walk over the terrain from pixel to pixel, along rows best.
-#[derive(Debug)]
-pub struct PixelWalk<'a> {
-    rays: &'a FrameRays<'a>,
-    /// By rays of a row of the readout.
-    walk: Option<(usize, TerrainWalk<'a>)>,
-}
-
-impl PixelWalk<'_> {
-    /// What the ray `uv` of a pixel meets if that is on the same unfolded patch of the terrain as a triangle
-    /// that a pixel nearby sees ([`TerrainWalk::to`]), and no model is within `window` times its depth in front
-    /// of it.
-    #[must_use]
-    #[inline]
-    pub fn to(
-        &mut self,
-        from: TerrainTriangle,
-        pixel: [u32; 2],
-        uv: DVec2,
-        window: f64,
-    ) -> Option<PixelTruth> {
-        let rays = self.rays;
-        let (RowCamera { t_s, pose }, ray_ned) = rays.ray(&rays.mid, pixel, uv);
-        let line = rays.line(pixel);
-        let known = self.walk.take().filter(|(of, walk)| *of == line && walk.triangle() == from);
-        let walk = match known {
-            Some((_, walk)) => walk,
-            None => TerrainWalk::new(rays.surfaces.terrain()?, from, pose.position_ned_m),
-        };
-        let (_, walk) = self.walk.insert((line, walk));
-        let hit = walk.to(ray_ned)?;
-        let depth_m = hit.t;
-        // What moves is not in the picture that was looked up.
-        let in_front_m = if rays.surfaces.moves() { depth_m } else { window * depth_m };
-        let start_ned_m = pose.position_ned_m + (depth_m - in_front_m) * ray_ned;
-        let is_hidden = rays.surfaces.model_hit_at(*t_s, start_ned_m, ray_ned, in_front_m).is_some();
-        let hit = RayHit { depth_m, normal_ned: hit.normal_ned, surface: 0, triangle: Some(hit.triangle) };
-        (!is_hidden).then(|| rays.truth(pixel, uv, Some(hit)))
-    }
-}
-
+/// A place of a packet without a ray.
+const NO_RAY: PacketRay = PacketRay { origin_ned_m: DVec3::ZERO, direction_ned: DVec3::Z, limit: -1.0 };
 /// Part of the path to a point that rounding may take for a surface in front of it.
 const LAST_PART: f64 = 1e-6;
 /// Relative difference of the depths that the two triangles of an edge give to a ray that hits it: rounding.

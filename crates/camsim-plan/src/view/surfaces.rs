@@ -14,7 +14,7 @@ use camsim_core::{
     pose::CameraPose,
     scene::{
         Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, proximity_bvh::ProximityBvh,
-        ray_bvh::RayBvh, terrain::Frustum, terrain::intersect_triangle,
+        ray_bvh::RayBvh, ray_packet::RayPacket, terrain::Frustum, terrain::intersect_triangle,
     },
 };
 use glam::{DMat3, DVec2, DVec3};
@@ -157,6 +157,34 @@ impl Surfaces {
         let Some(still) = &self.deep_still else { return self.first_hit(origin_ned_m, direction_ned) };
         let hit = self.first_hit_in(still, origin_ned_m, direction_ned);
         self.nearer_moving(t_s, origin_ned_m, direction_ned, f64::INFINITY, hit)
+    }
+
+    /// Meets a packet of rays with all that stands still, as [`Self::first_hit_at`].
+    pub fn meet_still(&self, packet: &mut RayPacket) {
+        if let Some(terrain) = self.terrain() {
+            terrain.meet_packet(packet);
+        }
+        self.meet_still_models(packet);
+    }
+
+    /// As [`Self::meet_still`], without the terrain.
+    pub fn meet_still_models(&self, packet: &mut RayPacket) {
+        let still = self.deep_still.as_ref().unwrap_or(&self.deep);
+        still.meet_packet(packet, (DMat3::IDENTITY, DVec3::ZERO), &mut |mesh, packet| {
+            let tree = &self.shapes[mesh as usize].for_rays;
+            self.scene.meshes[mesh as usize].meet_packet(packet, tree, 1 + mesh);
+        });
+    }
+
+    /// What moves in front of `limit` along a ray at path time `t_s`.
+    pub fn moving_hit_at(
+        &self,
+        t_s: f64,
+        origin_ned_m: DVec3,
+        direction_ned: DVec3,
+        limit: f64,
+    ) -> Option<SurfaceHit> {
+        self.nearer_moving(t_s, origin_ned_m, direction_ned, limit, None)
     }
 
     /// First model along `origin + t direction`, 0 <= t <= `limit`, at path time `t_s`.

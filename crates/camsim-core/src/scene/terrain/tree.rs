@@ -6,7 +6,10 @@
 use glam::DVec3;
 
 use super::bounds::Aabb;
-use crate::scene::box4::{Box4, BoxRay, down};
+use crate::scene::{
+    box4::{BeamBox, Box4, BoxRay, down},
+    ray_packet::Beam,
+};
 
 /// Cells along each side of the tree's leaves.
 pub(super) const BLOCK_CELLS: u32 = 4;
@@ -146,6 +149,42 @@ impl BlockTree {
                     enter[lane as usize],
                     BlockNode { level: below, at: [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2] },
                 );
+                count += 1;
+            }
+        }
+    }
+
+    /// Visits the blocks that a beam may meet, approximately front to back. `block` returns how far along it
+    /// others matter.
+    pub fn walk_beam(&self, beam: &Beam, farthest_m: f64, block: &mut dyn FnMut([u32; 2]) -> f64) {
+        let beam = BeamBox::new(beam, self.middle, self.extent_m);
+        let mut limit_m = -down(-farthest_m);
+        let mut waiting = [(0.0_f32, BlockNode::default()); MAX_WAITING];
+        let root = self.root();
+        let (near, is_met) = self.levels[root.level as usize].quads[0].meet(&beam, limit_m);
+        waiting[0] = (near.x, root);
+        let mut count = (is_met & 1) as usize;
+        while count > 0 {
+            count -= 1;
+            let (near_m, node) = waiting[count];
+            if near_m > limit_m {
+                continue;
+            }
+            let Some(below) = node.level.checked_sub(1) else {
+                limit_m = -down(-block(node.at));
+                continue;
+            };
+            let (near, is_met) = self.levels[below as usize].quad(node.at).meet(&beam, limit_m);
+            let first = count;
+            for lane in (0..4).filter(|lane| is_met & (1 << lane) != 0) {
+                // The nearest box is pushed last, so it is popped first.
+                let mut slot = count;
+                while slot > first && waiting[slot - 1].0 < near[lane as usize] {
+                    waiting[slot] = waiting[slot - 1];
+                    slot -= 1;
+                }
+                let at = [2 * node.at[0] + lane % 2, 2 * node.at[1] + lane / 2];
+                waiting[slot] = (near[lane as usize], BlockNode { level: below, at });
                 count += 1;
             }
         }

@@ -6,6 +6,7 @@ use glam::DVec2;
 
 use glam::DVec3;
 
+use super::PixelTruth;
 use crate::Planner;
 use camsim_core::{
     mount::CameraPath,
@@ -15,6 +16,7 @@ use camsim_core::{
     scene::{
         Encoding, Mesh, RigidMotion, Scene, Terrain, Texture,
         motion::{Joint, JointFrame, Track},
+        ray_packet::{PACKET_RAYS, RayPacket},
     },
     sequence::Sequence,
     trajectory::Trajectory,
@@ -110,4 +112,44 @@ fn only_exact_solvers_have_exact_truth() {
     assert!(looks(Some(Solver::Reproject), Channel::Depth));
     assert!(!looks(Some(Solver::Rk2), Channel::Depth) && !looks(Some(Solver::Linear), Channel::Coords));
     assert!(!looks(None, Channel::Color), "nothing is wanted");
+}
+
+#[test]
+fn packets_see_what_single_rays_see() {
+    let hub = glam::DAffine3::from_translation(DVec3::new(65.0, 5.0, -35.0));
+    let axis = DVec3::new(0.0, 0.6, 0.8);
+    let spin =
+        Joint::new(JointFrame::from_affine(&hub).unwrap(), Track::Spin { axis, hz: 3.0, phase_rad: 0.0 });
+    for (motion, phase) in [(None, 0.0), (Some(Arc::new(RigidMotion::new(vec![spin]))), 0.3)] {
+        let planner = Planner::new(sequence_with(None, motion), &[Channel::Coords], 16_384).unwrap();
+        let plan = planner.plan(1).unwrap();
+        let rays = planner.frame_rays(&plan, phase);
+        let (mut packet, mut count) = (RayPacket::default(), 0);
+        // Squares, a row, and pixels all over the picture, some of them missing.
+        for layout in 0..80 {
+            let pixels: [_; PACKET_RAYS] = std::array::from_fn(|i| {
+                let i = i as u32;
+                let pixel = match layout {
+                    0..60 => [layout % 10 * 8 + i % 8, layout / 10 * 8 + i / 8],
+                    60..70 => [i, layout - 60],
+                    _ => [(i * 37 + layout) % 80, (i * 23 + 7 * layout) % 60],
+                };
+                let is_there = pixel[1] < 60 && (layout < 50 || (i + layout) % 3 > 0);
+                is_there.then(|| Some((pixel, plan.camera.unproject_pixel(pixel)?))).flatten()
+            });
+            rays.cast_packet(&mut packet, &pixels, |i, seen| {
+                let (pixel, uv) = pixels[i].unwrap();
+                let alone = rays.cast(pixel, uv);
+                assert!(seen.source_px.distance(alone.source_px) < 1e-9, "{pixel:?}: {seen:?}, not {alone:?}");
+                let id = |truth: &PixelTruth| truth.hit.map(|hit| (hit.surface, hit.triangle));
+                assert_eq!(id(&seen), id(&alone), "{pixel:?}");
+                if let (Some(a), Some(b)) = (seen.hit, alone.hit) {
+                    assert!((a.depth_m / b.depth_m - 1.0).abs() < 1e-11, "{pixel:?}: {a:?}, not {b:?}");
+                    assert!(a.normal_ned.distance(b.normal_ned) < 1e-11, "{pixel:?}: {a:?}, not {b:?}");
+                }
+                count += 1;
+            });
+        }
+        assert!(count > 4000, "{count}");
+    }
 }
