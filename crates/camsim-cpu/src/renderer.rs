@@ -40,6 +40,8 @@ pub struct CpuRenderer {
     rasterises: bool,
     /// Whether rays draw every ideal frame and the general pass makes every output frame.
     general_only: bool,
+    /// Whether the vectorised pass leaves exact truth to rays.
+    leaves_truth: bool,
     /// Created when an ideal frame is first rasterised.
     raster: Option<RasterScene>,
     /// Created when an ideal frame is first cast.
@@ -81,6 +83,7 @@ impl CpuRenderer {
             meshes,
             rasterises: cpu_rasterises(&sequence.scene, u32::MAX),
             general_only: false,
+            leaves_truth: false,
             raster: None,
             cast: None,
             vignette: sequence.vignette_weights().1,
@@ -95,6 +98,12 @@ impl CpuRenderer {
     #[doc(hidden)]
     pub fn set_general_only(&mut self, general_only: bool) {
         self.general_only = general_only;
+    }
+
+    /// Has the vectorised pass leave exact truth to rays: depths below 0.
+    #[must_use]
+    pub fn leaving_truth(self) -> Self {
+        Self { leaves_truth: true, ..self }
     }
 
     /// Switches to another sequence over the same scene.
@@ -200,9 +209,9 @@ impl CpuRenderer {
         ideal: IdealTexels<'_>,
     ) -> (Vec<f32>, Option<Vec<Truth>>) {
         let &ReverseInputs { plan, uniforms, .. } = inputs;
-        let map = self.lens_map(plan);
-        self.kernel
-            .render(plan, &KernelInputs { frame: uniforms, poses, map, vignette: &self.vignette, ideal })
+        let (map, vignette, leaves_truth) = (self.lens_map(plan), &self.vignette[..], self.leaves_truth);
+        let inputs = KernelInputs { frame: uniforms, poses, map, vignette, ideal, leaves_truth };
+        self.kernel.render(plan, &inputs)
     }
 
     fn general(&self, inputs: &ReverseInputs<'_>, ideal: &[IdealImage]) -> (Vec<f32>, Option<Vec<Truth>>) {

@@ -67,6 +67,8 @@ pub struct KernelInputs<'a> {
     pub vignette: &'a [f32],
     /// The ideal frame.
     pub ideal: IdealTexels<'a>,
+    /// Whether exact truth is left to rays: depths below 0.
+    pub leaves_truth: bool,
 }
 
 /// State shared by the stages of a frame.
@@ -81,7 +83,7 @@ struct Stages<'a> {
     poses: &'a [LinePose],
     /// Pose of the key camera relative to the mid-window camera, if they differ and coordinates are output.
     reference_pose: Option<LinePose>,
-    /// Uniforms for the truth, if it is output: without the sky-reach rule, since the sky is at its own
+    /// Uniforms for the truth, if it is looked up: without the sky-reach rule, since the sky is at its own
     /// position, whatever surface is beside it.
     truth_frame: Option<&'a FrameUniforms>,
     /// Position of the first output pixel in the ideal frame, if output pixels are ideal pixels.
@@ -101,12 +103,13 @@ impl Kernel {
     #[must_use]
     pub fn render(&self, plan: &FramePlan, inputs: &KernelInputs<'_>) -> (Vec<f32>, Option<Vec<Truth>>) {
         let has_truth = plan.truth;
-        let KernelInputs { frame, poses, map, vignette, ideal } = *inputs;
+        let KernelInputs { frame, poses, map, vignette, ideal, leaves_truth } = *inputs;
+        let looks_up = has_truth && !(leaves_truth && plan.has_exact_truth());
         let [width, height] = frame.size_px.map(|side| side as usize);
         let truth_frame = FrameUniforms { sky_reach_px: 0.0, ..*frame };
         let stages = Stages {
             frame,
-            truth_frame: Some(&truth_frame).filter(|_| has_truth),
+            truth_frame: Some(&truth_frame).filter(|_| looks_up),
             ideal,
             temporal: plan.temporal,
             blur: plan.blur,
@@ -161,7 +164,7 @@ impl Stages<'_> {
 
     #[inline(always)]
     fn rows_by(&self, vectors: impl Vectors, first: u32, rows: &mut [f32], truth: &mut [Truth]) {
-        if let Some(from) = self.copied_from.filter(|_| self.truth_frame.is_none()) {
+        if let Some(from) = self.copied_from.filter(|_| truth.is_empty()) {
             return self.copied_rows(vectors, from, first, rows);
         }
         let width = self.frame.size_px[0] as usize;
@@ -169,8 +172,7 @@ impl Stages<'_> {
         for x in (0..width).step_by(LANES) {
             let end = width.min(x + LANES);
             for (number, row) in rows.chunks_exact_mut(4 * width).enumerate() {
-                let truth =
-                    if self.truth_frame.is_some() { &mut truth[number * width..][x..end] } else { &mut [] };
+                let truth = if truth.is_empty() { &mut [] } else { &mut truth[number * width..][x..end] };
                 self.block(vectors, [x as u32, first + number as u32], &mut row[4 * x..4 * end], truth);
             }
         }
@@ -188,6 +190,11 @@ impl Stages<'_> {
         let weight = self.weights(x, y);
         let is_wanted = per_lane(|i| if weight[i] > 0.0 { rays.valid[i] } else { 0.0 });
         let (mut colors, mut inside) = ([[0.0; 4]; LANES], rays.valid);
+        if self.truth_frame.is_none() {
+            for (i, truth) in truth.iter_mut().enumerate().filter(|&(i, _)| rays.valid[i] > 0.0) {
+                *truth = Truth { uv: [rays.uv.x[i], rays.uv.y[i]], depth_m: -1.0, ..Truth::default() };
+            }
+        }
         let is_needed = if self.truth_frame.is_some() { &rays.valid } else { &is_wanted };
         if let Some(mid) = self.poses_of(y).last().filter(|_| is_needed.iter().any(|&asked| asked > 0.0)) {
             let sides = || rays::sides(self.frame, self.map, x, y);

@@ -26,7 +26,7 @@ pub struct FrameTimes {
     pub wait_ms: f64,
     /// Output frame by the cpu renderer; `None` if the gpu renders it.
     pub reverse_ms: Option<f64>,
-    /// Read-back from the gpu, and with depth or coordinates the exact rays at unreliable pixels.
+    /// Read-back from the gpu, and the rays of the truth.
     pub read_ms: f64,
     /// Gpu passes, if [`crate::Session::time_passes`] was called and the adapter has time stamps.
     pub passes: Vec<PassTime>,

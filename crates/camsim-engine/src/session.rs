@@ -100,7 +100,7 @@ impl<'a> Session<'a> {
         Ok(Self {
             engine,
             lanes: lanes(&planner, scene_planner.as_deref(), moving, &[]),
-            cpu: CpuRenderer::new(still, meshes),
+            cpu: CpuRenderer::new(still, meshes).leaving_truth(),
             planner,
             scene_planner,
             gpu,
@@ -383,7 +383,7 @@ impl<'a> Session<'a> {
         whole
     }
 
-    /// The frame with its truth, from exact rays where depth look-ups are unreliable.
+    /// The frame with its truth.
     fn with_truth(
         &mut self,
         lane: usize,

@@ -94,7 +94,7 @@ pub enum PlaneKind {
 pub enum ChannelSource {
     /// The picture, or the plan.
     Picture,
-    /// The renderers, corrected by rays where their look-ups are unreliable.
+    /// A ray for every pixel; with the paper's solvers the renderers.
     Renderer,
     /// A ray for every pixel.
     Rays,

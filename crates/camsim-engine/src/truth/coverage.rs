@@ -3,9 +3,15 @@
 //! A pixel is an area of 1 x 1 and an exposure of its row. Its coverage is the fraction of rays through that box
 //! that meet the object that the pixel's centre sees at mid-exposure. Only pixels near a border between objects
 //! (or the sky) can have less than 1: those within the reach of a pixel that has another object beside it. The
-//! reach of a pixel is the path of its point in the picture during the exposure, plus 1 px.
+//! reach of a pixel is the path of its point in the picture during the exposure, across and down, plus 1 px.
 
-use camsim_core::{pose::CameraPose, shutter::RowAxis};
+use camsim_core::{
+    camera::CameraModel,
+    pose::CameraPose,
+    scene::ray_packet::{PACKET_RAYS, PacketHit, RayPacket},
+    shutter::RowAxis,
+};
+use camsim_plan::{PHASES, TimedRay};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -16,8 +22,8 @@ use super::{
 
 /// Rays of a pixel near a border.
 pub(crate) const RAYS: u32 = 64;
-/// Exposure phases between which the path of a point is measured: vibration may turn it back.
-const PHASES: i32 = 8;
+/// Largest error of a ray between those that are solved, pixels.
+const QUADRATIC_PX: f64 = 1e-4;
 /// Longest reach, pixels. Beyond it a picture is all blur.
 const MOST_REACH_PX: f64 = 256.0;
 
@@ -40,17 +46,49 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
     let near = near_borders(pixels, &objects);
     let rays: Vec<(DVec2, f64)> = (0..RAYS).map(ray).collect();
     let cameras = LineCameras::new(pixels, &near, &rays);
-    pixels.map(&0.0, |pixel| {
-        let Some(i) = index(pixels, pixel.position.map(i64::from)).filter(|&i| near[i]) else { return 1.0 };
-        let from_px = DVec2::from_array(pixel.position.map(f64::from));
-        let (mut same, mut all) = (0_u32, 0_u32);
-        for ((position, _), (t_s, pose)) in rays.iter().zip(cameras.of(pixel.position)) {
-            let Some(uv) = pixels.plan.camera.unproject(from_px + *position) else { continue };
-            all += 1;
-            same += u32::from(Some(object_of(pixels, pixels.rays.surface(*t_s, pose, uv))) == objects[i]);
+    let of_pixel = |packet: &mut RayPacket, i: usize| {
+        let Some(Pixel { position, .. }) = pixels.pixel(i) else { return 0.0 };
+        if !near[i] {
+            return 1.0;
         }
+        let uvs = uvs(&pixels.plan.camera, position, &rays);
+        let of_rays = std::array::from_fn(|k| {
+            let (t_s, CameraPose { position_ned_m, ned_from_camera }) = cameras.of(position)[k];
+            let direction_ned = ned_from_camera * uvs[k]?.extend(1.0);
+            Some(TimedRay { t_s, origin_ned_m: position_ned_m, direction_ned, limit: f64::INFINITY })
+        });
+        let hits = pixels.rays.first_hits(packet, &of_rays, true);
+        let seen = hits.iter().zip(&of_rays).filter(|(_, ray)| ray.is_some());
+        let is_same = |hit: &Option<PacketHit>| Some(object_of(pixels, hit.map(|hit| hit.surface))) == objects[i];
+        let (same, all) = seen.fold((0_u32, 0_u32), |(same, all), (hit, _)| (same + u32::from(is_same(hit)), all + 1));
         // Rays fail at the border of the lens's field only.
         if all == 0 { 1.0 } else { same as f32 / all as f32 }
+    };
+    (0..pixels.truth.len()).into_par_iter().with_min_len(256).map_init(RayPacket::default, of_pixel).collect()
+}
+
+/// Ideal rays of a pixel's positions. The lens's inverse is solved at nine, and quadratic between these if that is
+/// exact to [`QUADRATIC_PX`] where a cubic term is largest.
+fn uvs(camera: &CameraModel, pixel: [u32; 2], rays: &[(DVec2, f64)]) -> [Option<DVec2>; PACKET_RAYS] {
+    let from_px = DVec2::from_array(pixel.map(f64::from));
+    let steps = [-0.5, 0.0, 0.5];
+    let nodes = steps.map(|y| steps.map(|x| camera.unproject(from_px + DVec2::new(x, y))));
+    // Weights of -0.5, 0 and 0.5.
+    let weights = |s: f64| [s * (2.0 * s - 1.0), 1.0 - 4.0 * s * s, s * (2.0 * s + 1.0)];
+    let between = |DVec2 { x, y }: DVec2| -> Option<DVec2> {
+        let across = weights(x);
+        let row = |nodes: &[Option<DVec2>; 3]| -> Option<DVec2> {
+            Some(across[0] * nodes[0]? + across[1] * nodes[1]? + across[2] * nodes[2]?)
+        };
+        let down = weights(y);
+        Some(down[0] * row(&nodes[0])? + down[1] * row(&nodes[1])? + down[2] * row(&nodes[2])?)
+    };
+    let largest = DVec2::new(0.5, -0.5) / 3.0_f64.sqrt();
+    let off = between(largest).zip(camera.unproject(from_px + largest)).map(|(a, b)| (a - b) * camera.focal_px);
+    let is_quadratic = off.is_some_and(|off| off.length() <= QUADRATIC_PX);
+    std::array::from_fn(|k| {
+        let (position, _) = rays[k];
+        if is_quadratic { between(position) } else { camera.unproject(from_px + position) }
     })
 }
 
@@ -114,24 +152,25 @@ fn near_borders(pixels: &FramePixels<'_>, objects: &[Option<u32>]) -> Vec<bool> 
     });
     let [width, height] = pixels.plan.camera.size_px.map(|side| side as usize);
     let mut near = vec![false; width * height];
-    for (i, reach) in reaches.iter().enumerate().filter_map(|(i, reach)| Some((i, (*reach)?))) {
+    for (i, [across, down]) in reaches.iter().enumerate().filter_map(|(i, reach)| Some((i, (*reach)?))) {
         let (x, y) = (i % width, i / width);
-        for row in y.saturating_sub(reach)..(y + reach + 1).min(height) {
-            near[row * width..][x.saturating_sub(reach)..(x + reach + 1).min(width)].fill(true);
+        for row in y.saturating_sub(down)..(y + down + 1).min(height) {
+            near[row * width..][x.saturating_sub(across)..(x + across + 1).min(width)].fill(true);
         }
     }
     near
 }
 
-/// Whole pixels about a pixel that the point it sees may come to in the exposure, and 1 px more: a border to a
-/// neighbour is within half a pixel of one of the two centres, and the area of a pixel extends as far.
-fn reach_px(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> usize {
-    let phases = (-PHASES..=PHASES).map(|k| 0.5 * f64::from(k) / f64::from(PHASES));
+/// Whole pixels across and down from a pixel that the point it sees may come to in the exposure, and 1 px more: a
+/// border to a neighbour is within half a pixel of one of the two centres, and the area of a pixel extends as far.
+fn reach_px(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [usize; 2] {
+    let phases = (0..=PHASES).map(|k| k as f64 / PHASES as f64 - 0.5);
     // A point that its camera does not show at an instant has left the picture.
+    let most = DVec2::splat(MOST_REACH_PX);
     let path_px = phases
-        .map(|phase| moved_px(pixels, pixel, phase).map_or(MOST_REACH_PX, |px| px.abs().max_element()))
-        .fold(0.0, f64::max);
-    (path_px.min(MOST_REACH_PX) + 1.0) as usize
+        .map(|phase| moved_px(pixels, pixel, phase).map_or(most, DVec2::abs))
+        .fold(DVec2::ZERO, DVec2::max);
+    path_px.min(most).to_array().map(|px| (px + 1.0) as usize)
 }
 
 fn index(pixels: &FramePixels<'_>, [x, y]: [i64; 2]) -> Option<usize> {

@@ -3,13 +3,18 @@
 mod parallax;
 
 use camsim_core::{
-    row_time::{FrameCamera, RowProjector, Shown, WorldPoint},
+    row_time::{FrameCamera, ImagePoint, RowProjector, Shown, WorldPoint},
     scenario::FlowState,
+    scene::ray_packet::{PACKET_RAYS, RayPacket},
 };
+use camsim_plan::TimedRay;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::planes::{FramePixels, Pixel};
+use super::{
+    hits::{SIDE, square},
+    planes::{FramePixels, Pixel},
+};
 use parallax::Doubt;
 
 /// What a pixel sees, as a point of the world that follows what it is on; the sky is infinitely far away.
@@ -28,18 +33,39 @@ pub(super) fn flow(pixels: &FramePixels<'_>, target: &FrameCamera) -> Vec<[f32; 
     let width = pixels.plan.camera.size_px[0] as usize;
     let (doubt, projector) = (Doubt::of(pixels, target), target.projector());
     let mut flow = vec![[0.0; 3]; pixels.truth.len()];
-    flow.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+    let bands = flow.par_chunks_mut(SIDE * width).enumerate();
+    bands.for_each_init(RayPacket::default, |packet, (number, values)| {
+        let first = number * SIDE * width;
         let mut before = DVec2::ZERO;
-        for (i, value) in (y * width..).zip(row) {
-            let Some(pixel) = pixels.pixel(i) else { continue };
-            let landing = Landing { pixels, projector: &projector, pixel, is_in_doubt: doubt.is_at(i) };
-            let Some((shift, state)) = landing.find(before) else { continue };
-            before = shift;
-            let [dx, dy] = shift.as_vec2().to_array();
-            *value = [dx, dy, f32::from(state as u8)];
+        for x in (0..width).step_by(SIDE) {
+            let places = square(width, values.len(), [x, 0], 1);
+            let mut rays = [None; PACKET_RAYS];
+            let mut is_any_in_doubt = false;
+            for (ray, at) in rays.iter_mut().zip(places) {
+                let Some((at, pixel)) = at.and_then(|at| Some((at, pixels.pixel(first + at)?))) else { continue };
+                let is_in_doubt = doubt.is_at(first + at);
+                let landing = Landing { pixels, projector: &projector, pixel, is_in_doubt };
+                let Some((shift, state, open)) = landing.find(before) else { continue };
+                before = shift;
+                values[at] = value(shift, state);
+                *ray = open;
+                is_any_in_doubt |= is_in_doubt;
+            }
+            if rays.iter().all(Option::is_none) {
+                continue;
+            }
+            let hits = pixels.rays.first_hits(packet, &rays, is_any_in_doubt);
+            for at in hits.iter().zip(places).filter_map(|(hit, at)| hit.and(at)) {
+                values[at][2] = f32::from(FlowState::Occluded as u8);
+            }
         }
     });
     flow
+}
+
+fn value(shift: DVec2, state: FlowState) -> [f32; 3] {
+    let [dx, dy] = shift.as_vec2().to_array();
+    [dx, dy, f32::from(state as u8)]
 }
 
 /// Where a picture shows what a pixel sees.
@@ -52,16 +78,19 @@ struct Landing<'a> {
 }
 
 impl Landing<'_> {
-    /// Displacement, looked for near that of the pixel before; `None` where there is none.
-    fn find(&self, before: DVec2) -> Option<(DVec2, FlowState)> {
+    /// Displacement, looked for near that of the pixel before, and a ray that decides whether it is hidden there,
+    /// if that is open; `None` where there is no displacement.
+    fn find(&self, before: DVec2) -> Option<(DVec2, FlowState, Option<TimedRay>)> {
         let from_px = DVec2::from_array(self.pixel.position.map(f64::from));
         let point = world_point(self.pixels, self.pixel);
-        let (px, state) = match self.projector.by_steps(point, from_px + before) {
-            Some(only) if self.is_hidden(point, &only) => (only.px, FlowState::Occluded),
-            Some(only) => (only.px, FlowState::Visible),
-            None => self.find_all(point, from_px)?,
+        let (px, state, open) = match self.projector.by_steps(point, from_px + before) {
+            Some(only) => (only.px, FlowState::Visible, self.ray_to(point, &only)),
+            None => {
+                let (px, state) = self.find_all(point, from_px)?;
+                (px, state, None)
+            }
         };
-        Some((px - from_px, state))
+        Some((px - from_px, state, open))
     }
 
     /// Where the picture shows the point; of several positions the nearest at which nothing is in front of it.
@@ -72,7 +101,11 @@ impl Landing<'_> {
         let Some(nearest) = found.first() else {
             return target.outside(point, from_px).map(|px| (px, FlowState::Outside));
         };
-        let mut seen = found.iter().filter(|shown| !self.is_hidden(point, &Shown::from(**shown)));
+        let is_hidden = |shown: &ImagePoint| {
+            let ray = self.ray_to(point, &Shown::from(*shown));
+            ray.is_some_and(|ray| self.pixels.rays.is_hidden(&ray, self.is_in_doubt))
+        };
+        let mut seen = found.iter().filter(|shown| !is_hidden(shown));
         Some(match (seen.next(), seen.next()) {
             (None, _) => (nearest.px, FlowState::Occluded),
             (Some(only), None) => (only.px, FlowState::Visible),
@@ -80,21 +113,17 @@ impl Landing<'_> {
         })
     }
 
-    fn is_hidden(&self, point: WorldPoint<'_>, shown: &Shown) -> bool {
-        let rays = self.pixels.rays;
-        if !self.is_in_doubt && !rays.has_models() {
-            return false;
+    /// The ray to the point; `None` where nothing can hide it.
+    fn ray_to(&self, point: WorldPoint<'_>, shown: &Shown) -> Option<TimedRay> {
+        if !self.is_in_doubt && !self.pixels.rays.has_models() {
+            return None;
         }
         let Shown { t_s, position_ned_m, depth_m, .. } = *shown;
-        let ray_ned = match point {
-            WorldPoint::Towards(direction_ned) => Some(direction_ned),
-            _ => point.position_ned_m(t_s).map(|now_ned_m| (now_ned_m - position_ned_m) / depth_m),
+        let direction_ned = match point {
+            WorldPoint::Towards(direction_ned) => direction_ned,
+            _ => (point.position_ned_m(t_s)? - position_ned_m) / depth_m,
         };
-        let hides = |ray_ned| match self.is_in_doubt {
-            true => rays.is_hidden(t_s, position_ned_m, ray_ned, depth_m),
-            false => rays.is_behind_model(t_s, position_ned_m, ray_ned, depth_m),
-        };
-        ray_ned.is_some_and(hides)
+        Some(TimedRay::up_to(t_s, position_ned_m, direction_ned, depth_m))
     }
 }
 
@@ -108,9 +137,8 @@ impl Landing<'_> {
 /// sky have v / X.z = 0.
 pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
     let plan = pixels.plan;
-    let path = &pixels.planner.sequence().path;
-    let [x, y] = pixel.position;
-    let t_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
+    let t_s = pixels.rays.mid_s(pixel.position);
+    let [velocity_ned, rate_camera] = pixels.rays.camera_movement(pixel.position);
     let camera_from_ned = pixels.rays.pose(pixel.position).ned_from_camera.conjugate();
     let inverse_depth = pixel.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
     let ray = pixel.uv.extend(1.0);
@@ -118,8 +146,8 @@ pub(super) fn motion(pixels: &FramePixels<'_>, pixel: Pixel<'_>) -> [f32; 2] {
         let motion = pixels.planner.sequence().scene.motion_of_surface(hit.surface)?;
         Some(motion.state(t_s).velocity(hit.point_ned_m))
     });
-    let velocity: DVec3 = camera_from_ned * (path.velocity_ned(t_s) - of_surface.unwrap_or(DVec3::ZERO));
-    let ray_rate = -path.rate_camera(t_s).cross(ray) - velocity * inverse_depth;
+    let velocity: DVec3 = camera_from_ned * (velocity_ned - of_surface.unwrap_or(DVec3::ZERO));
+    let ray_rate = -rate_camera.cross(ray) - velocity * inverse_depth;
     let uv_rate = ray_rate.truncate() - pixel.uv * ray_rate.z;
     let px_rate = plan.camera.focal_px * (plan.camera.lens.jacobian(pixel.uv) * uv_rate);
     px_rate.as_vec2().to_array()

@@ -6,7 +6,21 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 /// Pixels along a side of a packet.
-const SIDE: usize = 8;
+pub(super) const SIDE: usize = 8;
+
+/// Places of a packet's pixels among `count` pixels of rows of `width`: a square whose first pixel is at `x`, `y`,
+/// with every `step`-th row.
+pub(super) fn square(
+    width: usize,
+    count: usize,
+    [x, y]: [usize; 2],
+    step: usize,
+) -> [Option<usize>; PACKET_RAYS] {
+    std::array::from_fn(|i| {
+        let at = width * (y + step * (i / SIDE)) + x + i % SIDE;
+        (x + i % SIDE < width && at < count).then_some(at)
+    })
+}
 
 /// What the ray of every valid pixel meets. Depths and coordinates of `truth` become those of the rays; surfaces
 /// go to `hits`, if given, where the sky and pixels without a ray stay as they are. Pixels are valid where
@@ -52,13 +66,8 @@ struct Band<'a> {
 impl Band<'_> {
     /// Casts the rays of a square whose first pixel is at `x` and `y` of the band.
     fn cast(&mut self, rays: &FrameRays<'_>, packet: &mut RayPacket, [x, y]: [usize; 2]) {
-        let at = |i: usize| {
-            let [x, y] = [x + i % SIDE, y + self.step * (i / SIDE)];
-            (x < self.width).then_some(self.width * y + x)
-        };
-        let places: [Option<usize>; PACKET_RAYS] = std::array::from_fn(|i| {
-            at(i).filter(|&at| self.color_rgba.get(4 * at + 3).is_some_and(|&alpha| alpha > 0.0))
-        });
+        let is_valid = |&at: &usize| self.color_rgba[4 * at + 3] > 0.0;
+        let places = square(self.width, self.truth.len(), [x, y], self.step).map(|at| at.filter(is_valid));
         let pixel = |at: usize| {
             let position = [(at % self.width) as u32, (self.first_row + at / self.width) as u32];
             let [u, v] = self.truth[at].uv.map(f64::from);

@@ -233,9 +233,8 @@ impl FramePlan {
 }
 
 impl FramePlan {
-    /// Whether depth and coordinates are wanted and exact: where their look-up in the ideal frame may be
-    /// wrong, rays decide (`camsim_core::temporal::unreliable_depth`). With the paper's solvers they say where
-    /// these look instead.
+    /// Whether depth and coordinates are wanted and exact, by rays. With the paper's solvers they say where these
+    /// look instead.
     #[must_use]
     pub fn has_exact_truth(&self) -> bool {
         self.truth && !matches!(self.temporal, TemporalStage::Linear | TemporalStage::Rk2)

@@ -8,12 +8,14 @@
 #[cfg(test)]
 mod tests;
 
+use std::sync::OnceLock;
+
 use camsim_core::{
     mount::CameraPath,
     pose::CameraPose,
     scene::{
         TerrainTriangle,
-        ray_packet::{PACKET_RAYS, PacketRay, RayPacket},
+        ray_packet::{PACKET_RAYS, PacketHit, PacketRay, RayPacket},
     },
     shutter::RowAxis,
 };
@@ -49,15 +51,6 @@ pub struct PixelHit {
     pub triangle: Option<TerrainTriangle>,
 }
 
-/// A hit along a ray.
-#[derive(Clone, Copy)]
-struct RayHit {
-    depth_m: f64,
-    normal_ned: DVec3,
-    surface: u32,
-    triangle: Option<TerrainTriangle>,
-}
-
 /// Camera at one instant.
 #[derive(Clone, Copy, Debug)]
 struct RowCamera {
@@ -68,6 +61,19 @@ struct RowCamera {
     /// To the key camera's axes, and from its position there.
     key_from_camera: DMat3,
     shift_key_m: DVec3,
+}
+
+impl TimedRay {
+    /// To what is at planar depth `depth_m`, leaving out the last millionth of the path.
+    #[must_use]
+    pub fn up_to(t_s: f64, origin_ned_m: DVec3, direction_ned: DVec3, depth_m: f64) -> Self {
+        Self { t_s, origin_ned_m, direction_ned, limit: (1.0 - LAST_PART) * depth_m }
+    }
+
+    fn untimed(self) -> PacketRay {
+        let Self { origin_ned_m, direction_ned, limit, .. } = self;
+        PacketRay { origin_ned_m, direction_ned, limit }
+    }
 }
 
 impl RowCamera {
@@ -85,29 +91,71 @@ pub struct FrameRays<'a> {
     path: &'a CameraPath,
     surfaces: &'a Surfaces,
     plan: &'a FramePlan,
-    /// Camera at mid-exposure of each row, or of each column in either field.
+    /// A pixel of each line: of each row, or of each column in either field.
+    lines: Vec<[u32; 2]>,
+    /// Camera at mid-exposure of each line.
     mid: Vec<RowCamera>,
     /// Camera at the exposure phase of the coordinates; empty where that is mid-exposure.
     at_phase: Vec<RowCamera>,
+    /// Cameras at the phases k / [`PHASES`] - 0.5 of each line, once they are asked for, and their velocities (NED)
+    /// and angular rates (camera axes) at mid-exposure.
+    at_phases: [OnceLock<Vec<RowCamera>>; PHASES + 1],
+    movement: OnceLock<Vec<[DVec3; 2]>>,
 }
+
+/// A ray of a camera at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct TimedRay {
+    /// Path time, seconds.
+    pub t_s: f64,
+    /// NED, metres.
+    pub origin_ned_m: DVec3,
+    /// NED.
+    pub direction_ned: DVec3,
+    /// Largest ray parameter.
+    pub limit: f64,
+}
+
+/// Equal parts of an exposure at whose ends cameras are kept.
+pub const PHASES: usize = 16;
 
 impl<'a> FrameRays<'a> {
     /// Rays whose coordinates are of exposure phase `phase`, -0.5 to 0.5.
     pub(crate) fn new(path: &'a CameraPath, surfaces: &'a Surfaces, plan: &'a FramePlan, phase: f64) -> Self {
         let [columns, rows] = plan.camera.size_px;
-        let pixels: Vec<[u32; 2]> = match plan.shutter.row_axis() {
+        let lines = match plan.shutter.row_axis() {
             RowAxis::Rows => (0..rows).map(|y| [0, y]).collect(),
             RowAxis::Columns => (0..columns).flat_map(|x| [[x, 0], [x, 1]]).collect(),
         };
-        let shutter = &plan.shutter;
-        let cameras = |phase: f64| {
-            let times = pixels.iter().map(|&[x, y]| {
-                plan.stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y)
-            });
-            times.map(|t_s| RowCamera::new(t_s, path.pose(t_s), &plan.key_pose)).collect()
+        let mut rays = Self {
+            path,
+            surfaces,
+            plan,
+            lines,
+            mid: Vec::new(),
+            at_phase: Vec::new(),
+            at_phases: Default::default(),
+            movement: OnceLock::new(),
         };
-        let at_phase = if phase * shutter.exposure_s() == 0.0 { Vec::new() } else { cameras(phase) };
-        Self { path, surfaces, plan, mid: cameras(0.0), at_phase }
+        rays.mid = rays.cameras(0.0);
+        if phase * plan.shutter.exposure_s() != 0.0 {
+            rays.at_phase = rays.cameras(phase);
+        }
+        rays
+    }
+
+    /// Camera of each line at an exposure phase.
+    fn cameras(&self, phase: f64) -> Vec<RowCamera> {
+        let camera = |&line: &[u32; 2]| {
+            let t_s = self.time_s(line, phase);
+            RowCamera::new(t_s, self.path.pose(t_s), &self.plan.key_pose)
+        };
+        self.lines.iter().map(camera).collect()
+    }
+
+    fn time_s(&self, [x, y]: [u32; 2], phase: f64) -> f64 {
+        let FramePlan { shutter, stamp_s, .. } = self.plan;
+        stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y)
     }
 
     /// How far the drawn terrain may be from where it is, pixels of the output frame; 0 without a terrain.
@@ -121,23 +169,25 @@ impl<'a> FrameRays<'a> {
     /// What the ray `uv` of a pixel meets.
     #[must_use]
     pub fn cast(&self, pixel: [u32; 2], uv: DVec2) -> PixelTruth {
-        let hit = self.first_hit(&self.mid, pixel, uv).map(|hit| self.ray_hit(&hit));
-        let source_px = match self.at_phase.is_empty() {
-            true => self.source_px(&self.mid, pixel, uv, hit.map(|hit| hit.depth_m)),
-            false => self.source_at_phase(pixel, uv),
+        let hit = self.first_hit(&self.mid, pixel, uv);
+        let (rows, of_source) = match self.at_phase.is_empty() {
+            true => (&self.mid, hit),
+            false => (&self.at_phase, self.first_hit(&self.at_phase, pixel, uv)),
         };
+        let source_px = self.source_px(rows, pixel, uv, of_source.map(|hit| hit.t));
         self.truth(pixel, uv, hit, source_px)
     }
 
-    fn first_hit(&self, rows: &[RowCamera], pixel: [u32; 2], uv: DVec2) -> Option<SurfaceHit> {
+    fn first_hit(&self, rows: &[RowCamera], pixel: [u32; 2], uv: DVec2) -> Option<PacketHit> {
         let (RowCamera { t_s, pose, .. }, ray_ned) = self.ray(rows, pixel, uv);
-        self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned)
+        let hit = self.surfaces.first_hit_at(*t_s, pose.position_ned_m, ray_ned);
+        hit.map(|hit| self.packet_hit(&hit))
     }
 
-    fn ray_hit(&self, hit: &SurfaceHit) -> RayHit {
+    fn packet_hit(&self, hit: &SurfaceHit) -> PacketHit {
         let SurfaceHit { depth_m, normal_ned, surface, terrain, .. } = *hit;
         let triangle = self.surfaces.terrain().zip(terrain).map(|(terrain, hit)| hit.triangle_of(terrain));
-        RayHit { depth_m, normal_ned, surface: surface as u32, triangle }
+        PacketHit { t: depth_m, normal_ned, surface: surface as u32, triangle }
     }
 
     /// What the rays of pixels near each other meet, as [`Self::cast`] for each; `found` gets their places among
@@ -148,60 +198,50 @@ impl<'a> FrameRays<'a> {
         pixels: &[Option<([u32; 2], DVec2)>; PACKET_RAYS],
         mut found: impl FnMut(usize, PixelTruth),
     ) {
-        let Some(first) = self.hits_of_packet(packet, &self.mid, pixels) else {
-            let each = pixels.iter().enumerate().filter_map(|(i, pixel)| Some((i, (*pixel)?)));
-            return each.for_each(|(i, (pixel, uv))| found(i, self.cast(pixel, uv)));
+        let hits_of = |rows: &[RowCamera], packet: &mut RayPacket| {
+            let mut rays = [None; PACKET_RAYS];
+            for (ray, pixel) in rays.iter_mut().zip(pixels) {
+                let Some((pixel, uv)) = *pixel else { continue };
+                let (RowCamera { t_s, pose, .. }, direction_ned) = self.ray(rows, pixel, uv);
+                let limit = f64::INFINITY;
+                *ray = Some(TimedRay { t_s: *t_s, origin_ned_m: pose.position_ned_m, direction_ned, limit });
+            }
+            self.first_hits(packet, &rays, true)
         };
-        let at_phase = (!self.at_phase.is_empty()).then(|| self.hits_of_packet(packet, &self.at_phase, pixels));
-        for (i, hit) in first.iter().enumerate() {
+        let hits = hits_of(&self.mid, packet);
+        let at_phase = (!self.at_phase.is_empty()).then(|| hits_of(&self.at_phase, packet));
+        let (rows, of_source) = at_phase.as_ref().map_or((&self.mid, &hits), |hits| (&self.at_phase, hits));
+        for (i, hit) in hits.iter().enumerate() {
             let Some((pixel, uv)) = pixels[i] else { continue };
-            let source_px = match &at_phase {
-                None => self.source_px(&self.mid, pixel, uv, hit.map(|hit| hit.depth_m)),
-                Some(Some(hits)) => {
-                    self.source_px(&self.at_phase, pixel, uv, hits[i].map(|hit| hit.depth_m))
-                }
-                Some(None) => self.source_at_phase(pixel, uv),
-            };
+            let source_px = self.source_px(rows, pixel, uv, of_source[i].map(|hit| hit.t));
             found(i, self.truth(pixel, uv, *hit, source_px));
         }
     }
 
-    /// What each ray of a packet meets; `None` for rays that have to be traced alone.
-    fn hits_of_packet(
+    /// What rays near each other meet first, with or without the terrain. `packet` is scratch.
+    pub fn first_hits(
         &self,
         packet: &mut RayPacket,
-        rows: &[RowCamera],
-        pixels: &[Option<([u32; 2], DVec2)>; PACKET_RAYS],
-    ) -> Option<[Option<RayHit>; PACKET_RAYS]> {
-        let mut rays = [NO_RAY; PACKET_RAYS];
-        for (ray, pixel) in rays.iter_mut().zip(pixels) {
-            let Some((pixel, uv)) = *pixel else { continue };
-            let (RowCamera { pose, .. }, direction_ned) = self.ray(rows, pixel, uv);
-            *ray = PacketRay { origin_ned_m: pose.position_ned_m, direction_ned, limit: f64::INFINITY };
-        }
-        if !packet.begin(&rays) {
-            return None;
-        }
-        self.surfaces.meet_still(packet);
+        rays: &[Option<TimedRay>; PACKET_RAYS],
+        with_terrain: bool,
+    ) -> [Option<PacketHit>; PACKET_RAYS] {
         let mut hits = [None; PACKET_RAYS];
-        for (i, hit) in hits.iter_mut().enumerate() {
-            *hit = packet.hit(i).map(|hit| RayHit {
-                depth_m: hit.t,
-                normal_ned: hit.normal_ned,
-                surface: hit.surface,
-                triangle: hit.triangle,
-            });
+        let is_packet = packet.begin(&rays.map(|ray| ray.map_or(NO_RAY, TimedRay::untimed)));
+        if is_packet {
+            self.surfaces.meet_still(packet, with_terrain);
         }
-        if self.surfaces.moves() {
-            for (hit, pixel) in hits.iter_mut().zip(pixels) {
-                let Some((pixel, uv)) = *pixel else { continue };
-                let (RowCamera { t_s, pose, .. }, ray_ned) = self.ray(rows, pixel, uv);
-                let limit = hit.map_or(f64::INFINITY, |hit| hit.depth_m);
-                let moving = self.surfaces.moving_hit_at(*t_s, pose.position_ned_m, ray_ned, limit);
-                *hit = moving.map(|moving| self.ray_hit(&moving)).or(*hit);
-            }
+        for (i, ray) in rays.iter().enumerate() {
+            let Some(ray @ TimedRay { t_s, origin_ned_m, direction_ned, limit }) = *ray else { continue };
+            let other = if is_packet {
+                hits[i] = packet.hit(i);
+                let limit = hits[i].map_or(limit, |hit| hit.t);
+                self.surfaces.moving_hit_at(t_s, origin_ned_m, direction_ned, limit)
+            } else {
+                self.first_alone(&ray, with_terrain)
+            };
+            hits[i] = other.map(|hit| self.packet_hit(&hit)).or(hits[i]);
         }
-        Some(hits)
+        hits
     }
 
     /// Whether a walk from a triangle that a pixel nearby sees ends at the triangle that this pixel sees: no
@@ -228,19 +268,23 @@ impl<'a> FrameRays<'a> {
 
     /// Instant and camera of a pixel at an exposure phase, -0.5 (begin) to 0.5 (end).
     #[must_use]
-    pub fn camera_at(&self, [x, y]: [u32; 2], phase: f64) -> (f64, CameraPose) {
-        let FramePlan { shutter, stamp_s, .. } = self.plan;
-        let t_s = stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y);
+    pub fn camera_at(&self, pixel: [u32; 2], phase: f64) -> (f64, CameraPose) {
+        let part = (phase + 0.5) * PHASES as f64;
+        let kept = (part.fract() == 0.0).then(|| self.at_phases.get(part as usize)).flatten();
+        if let Some(kept) = kept {
+            let RowCamera { t_s, pose, .. } = kept.get_or_init(|| self.cameras(phase))[self.line(pixel)];
+            return (t_s, pose);
+        }
+        let t_s = self.time_s(pixel, phase);
         (t_s, self.path.pose(t_s))
     }
 
-    /// The surface (0 = terrain, 1 + i = mesh i of the scene) that the ray `uv` of a camera meets first at path
-    /// time `t_s`.
+    /// Velocity (NED, m/s) and angular rate (camera axes, rad/s) of a pixel's camera at mid-exposure.
     #[must_use]
-    pub fn surface(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> Option<u32> {
-        let ray_ned = pose.ned_from_camera * uv.extend(1.0);
-        let hit = self.surfaces.first_hit_at(t_s, pose.position_ned_m, ray_ned);
-        hit.map(|hit| hit.surface as u32)
+    pub fn camera_movement(&self, pixel: [u32; 2]) -> [DVec3; 2] {
+        let of_line =
+            |camera: &RowCamera| [self.path.velocity_ned(camera.t_s), self.path.rate_camera(camera.t_s)];
+        self.movement.get_or_init(|| self.mid.iter().map(of_line).collect())[self.line(pixel)]
     }
 
     /// Mid-exposure of a pixel, path time, seconds.
@@ -250,20 +294,19 @@ impl<'a> FrameRays<'a> {
         self.ray(&self.mid, pixel, DVec2::ZERO).0.t_s
     }
 
-    /// Whether at path time `t_s` a surface lies between a camera and what it sees along a ray at planar depth
-    /// `depth_m` (infinite for the sky), leaving out the last millionth of the path.
+    /// Whether a ray meets a surface, or a model.
     #[must_use]
-    pub fn is_hidden(&self, t_s: f64, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
-        let hit = self.surfaces.first_hit_at(t_s, position_ned_m, ray_ned);
-        hit.is_some_and(|hit| hit.depth_m < (1.0 - LAST_PART) * depth_m)
+    pub fn is_hidden(&self, ray: &TimedRay, with_terrain: bool) -> bool {
+        self.first_alone(ray, with_terrain).is_some()
     }
 
-    /// Whether at path time `t_s` a model lies between a camera and what it sees along a ray at planar depth
-    /// `depth_m`, as [`Self::is_hidden`].
-    #[must_use]
-    pub fn is_behind_model(&self, t_s: f64, position_ned_m: DVec3, ray_ned: DVec3, depth_m: f64) -> bool {
-        let limit = (1.0 - LAST_PART) * depth_m;
-        self.surfaces.model_hit_at(t_s, position_ned_m, ray_ned, limit).is_some()
+    fn first_alone(&self, ray: &TimedRay, with_terrain: bool) -> Option<SurfaceHit> {
+        let TimedRay { t_s, origin_ned_m, direction_ned, limit } = *ray;
+        let hit = match with_terrain {
+            true => self.surfaces.first_hit_at(t_s, origin_ned_m, direction_ned),
+            false => self.surfaces.model_hit_at(t_s, origin_ned_m, direction_ned, limit),
+        };
+        hit.filter(|hit| hit.depth_m <= limit)
     }
 
     /// Whether there is anything but terrain.
@@ -301,21 +344,16 @@ impl<'a> FrameRays<'a> {
     }
 
     #[inline]
-    fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<RayHit>, source_px: DVec2) -> PixelTruth {
+    fn truth(&self, pixel: [u32; 2], uv: DVec2, hit: Option<PacketHit>, source_px: DVec2) -> PixelTruth {
         let (RowCamera { pose, .. }, ray_ned) = self.ray(&self.mid, pixel, uv);
-        let hit = hit.map(|RayHit { depth_m, normal_ned, surface, triangle }| PixelHit {
-            point_ned_m: pose.position_ned_m + depth_m * ray_ned,
-            depth_m,
+        let hit = hit.map(|PacketHit { t, normal_ned, surface, triangle }| PixelHit {
+            point_ned_m: pose.position_ned_m + t * ray_ned,
+            depth_m: t,
             normal_ned: if normal_ned.dot(ray_ned) > 0.0 { -normal_ned } else { normal_ned },
             surface,
             triangle,
         });
         PixelTruth { source_px, hit }
-    }
-
-    fn source_at_phase(&self, pixel: [u32; 2], uv: DVec2) -> DVec2 {
-        let hit = self.first_hit(&self.at_phase, pixel, uv);
-        self.source_px(&self.at_phase, pixel, uv, hit.map(|hit| hit.depth_m))
     }
 
     #[inline]

@@ -159,16 +159,11 @@ impl Surfaces {
         self.nearer_moving(t_s, origin_ned_m, direction_ned, f64::INFINITY, hit)
     }
 
-    /// Meets a packet of rays with all that stands still, as [`Self::first_hit_at`].
-    pub fn meet_still(&self, packet: &mut RayPacket) {
-        if let Some(terrain) = self.terrain() {
+    /// Meets a packet of rays with all that stands still, as [`Self::first_hit_at`], or without the terrain.
+    pub fn meet_still(&self, packet: &mut RayPacket, with_terrain: bool) {
+        if let Some(terrain) = self.terrain().filter(|_| with_terrain) {
             terrain.meet_packet(packet);
         }
-        self.meet_still_models(packet);
-    }
-
-    /// As [`Self::meet_still`], without the terrain.
-    pub fn meet_still_models(&self, packet: &mut RayPacket) {
         let still = self.deep_still.as_ref().unwrap_or(&self.deep);
         still.meet_packet(packet, (DMat3::IDENTITY, DVec3::ZERO), &mut |mesh, packet| {
             let tree = &self.shapes[mesh as usize].for_rays;
