@@ -86,11 +86,7 @@ impl BeamBox {
         };
         let start = beam.start - beam.forward.dot(middle);
         let start = start + slack(beam.forward) + ROUNDING * start.abs();
-        Self {
-            sides: beam.sides.map(side),
-            forward: beam.forward.as_vec3().to_array(),
-            start: -down(-start),
-        }
+        Self { sides: beam.sides.map(side), forward: beam.forward.as_vec3().to_array(), start: -down(-start) }
     }
 }
 

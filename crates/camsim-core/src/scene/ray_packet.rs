@@ -24,18 +24,33 @@ const ROUNDING: f64 = 1e-9;
 /// No triangle.
 const NONE: u32 = u32::MAX;
 
+const ROWS: usize = PACKET_RAYS / ROW;
+
 /// One number for each ray.
-type PerRay<T> = [[T; ROW]; PACKET_RAYS / ROW];
+type PerRay<T> = [[T; ROW]; ROWS];
 
 /// A ray of a packet: `origin + t direction`, 0 <= t <= limit.
 #[derive(Clone, Copy, Debug)]
 pub struct PacketRay {
+    /// Path time, seconds, for what moves.
+    pub t_s: f64,
     /// NED, metres.
     pub origin_ned_m: DVec3,
     /// NED, of any length.
     pub direction_ned: DVec3,
     /// Largest ray parameter; below 0 for a ray that is not there.
     pub limit: f64,
+}
+
+impl PacketRay {
+    /// The place of a ray that is not there.
+    pub const NONE: Self = Self { t_s: 0.0, origin_ned_m: DVec3::ZERO, direction_ned: DVec3::Z, limit: -1.0 };
+
+    /// Whether there is a ray.
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        self.limit >= 0.0
+    }
 }
 
 /// What a ray of a packet has met.
@@ -102,8 +117,10 @@ pub struct RayPacket {
     limit: PerRay<f64>,
     found: PerRay<u32>,
     met: Vec<Met>,
-    /// Smallest and largest u and v of the rays that are there.
+    /// Smallest and largest u and v of all rays, and of each row and column of rays.
     bounds: [[f64; 2]; 2],
+    row_bounds: [[f32; ROWS]; 2],
+    column_bounds: [[f32; ROW]; 2],
     /// Farthest origin, metres.
     spread_m: f64,
     /// Beyond the nearest hits of all rays.
@@ -112,9 +129,8 @@ pub struct RayPacket {
 
 impl Default for RayPacket {
     fn default() -> Self {
-        let nothing = PacketRay { origin_ned_m: DVec3::ZERO, direction_ned: DVec3::Z, limit: -1.0 };
         Self {
-            rays: [nothing; PACKET_RAYS],
+            rays: [PacketRay::NONE; PACKET_RAYS],
             origin_ned_m: DVec3::ZERO,
             packet_from_ned: DMat3::IDENTITY,
             origin: Default::default(),
@@ -125,6 +141,8 @@ impl Default for RayPacket {
             found: Default::default(),
             met: Vec::new(),
             bounds: [[0.0; 2]; 2],
+            row_bounds: Default::default(),
+            column_bounds: Default::default(),
             spread_m: 0.0,
             farthest_m: 0.0,
         }
@@ -147,15 +165,14 @@ impl RayPacket {
         /// Least cosine of the angle between a ray and the packet.
         const LEAST_Z: f64 = 0.5;
         self.met.clear();
-        self.found = [[NONE; ROW]; PACKET_RAYS / ROW];
+        self.found = [[NONE; ROW]; ROWS];
         self.rays = *rays;
-        let is_there = |ray: &PacketRay| ray.limit >= 0.0;
-        let Some(first) = rays.iter().find(|ray| is_there(ray)) else {
-            (self.limit, self.farthest_m) = ([[-1.0; ROW]; PACKET_RAYS / ROW], -1.0);
+        let Some(first) = rays.iter().find(|ray| ray.is_there()) else {
+            (self.limit, self.farthest_m) = ([[-1.0; ROW]; ROWS], -1.0);
             return true;
         };
         // Rays that are not there take the place of one that is.
-        self.rays.iter_mut().filter(|ray| !is_there(ray)).for_each(|ray| {
+        self.rays.iter_mut().filter(|ray| !ray.is_there()).for_each(|ray| {
             (ray.origin_ned_m, ray.direction_ned) = (first.origin_ned_m, first.direction_ned);
         });
         let middle = self.rays[PACKET_RAYS / 2 + ROW / 2];
@@ -194,9 +211,60 @@ impl RayPacket {
             }
         }
         self.bounds = [0, 1].map(|axis: usize| [low[axis] - ROUNDING, high[axis] + ROUNDING]);
+        self.find_bounds();
         self.spread_m = spread2.sqrt();
         self.find_farthest();
         is_together
+    }
+
+    #[inline(always)]
+    fn find_bounds(&mut self) {
+        self.row_bounds = [[f32::INFINITY; ROWS], [f32::NEG_INFINITY; ROWS]];
+        self.column_bounds = [[f32::INFINITY; ROW], [f32::NEG_INFINITY; ROW]];
+        let wider = |[low, high]: &mut [f32; 2], value: f32| {
+            *low = if value < *low { value } else { *low };
+            *high = if value > *high { value } else { *high };
+        };
+        for row in 0..ROWS {
+            let mut of_row = [f32::INFINITY, f32::NEG_INFINITY];
+            for k in 0..ROW {
+                wider(&mut of_row, self.uv_f32[1][row][k]);
+                let mut of_column = self.column_bounds.map(|bound| bound[k]);
+                wider(&mut of_column, self.uv_f32[0][row][k]);
+                [self.column_bounds[0][k], self.column_bounds[1][k]] = of_column;
+            }
+            [self.row_bounds[0][row], self.row_bounds[1][row]] = of_row;
+        }
+    }
+
+    /// Bits of the rows of rays that may meet a triangle; none if no column may. All for a triangle that is not in
+    /// front.
+    #[inline(always)]
+    fn rows_beside(&self, [a, b, c]: &[DVec3; 3]) -> u32 {
+        /// Of a quotient in single precision, with a reserve.
+        const SINGLE: f64 = 1e-6;
+        let per_z = [1.0 / a.z, 1.0 / b.z, 1.0 / c.z];
+        let nearest = a.z.min(b.z).min(c.z) - self.spread_m;
+        if !(nearest > 0.0) {
+            return u32::MAX;
+        }
+        let span = |at: [f64; 3]| {
+            let at = [at[0] * per_z[0], at[1] * per_z[1], at[2] * per_z[2]];
+            let (low, high) = (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]));
+            // Seen from a ray's own origin o: |(x - o_x) / (z - o_z) - x / z| <= |o| (1 + |x / z|) / (z - |o|).
+            let pad = (SINGLE + self.spread_m / nearest) * (1.0 + low.abs().max(high.abs()));
+            [(low - pad) as f32, (high + pad) as f32]
+        };
+        let [low, high] = span([a.x, b.x, c.x]);
+        let (mut columns, mut rows) = (0, 0);
+        for k in 0..ROW {
+            columns |= u32::from((self.column_bounds[0][k] <= high) & (self.column_bounds[1][k] >= low)) << k;
+        }
+        let [low, high] = span([a.y, b.y, c.y]);
+        for k in 0..ROWS {
+            rows |= u32::from((self.row_bounds[0][k] <= high) & (self.row_bounds[1][k] >= low)) << k;
+        }
+        if columns == 0 { 0 } else { rows }
     }
 
     /// Whether any ray may still meet something at this distance along the packet.
@@ -265,20 +333,25 @@ impl RayPacket {
         PacketSurface { surface, triangle, faces }: PacketSurface,
         exact: impl Fn(&PacketRay, f64) -> Option<f64>,
     ) {
+        let mut rows = self.rows_beside(&corners) & ((1 << ROWS) - 1);
+        if rows == 0 {
+            return;
+        }
         let [a, b, c] = corners;
         let edges = [c.cross(b), a.cross(c), b.cross(a)];
         let normal = (b - a).cross(c - a);
         let height = a.dot(normal);
         let slack = self.slack(&corners, &edges);
-        // Of edge functions that are all negative, surely or perhaps.
-        let [sure_back, open_back] =
-            if faces == Faces::Front { [f32::NEG_INFINITY; 2] } else { [-slack, slack] };
+        let is_two_sided = faces != Faces::Front;
         let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = edges.map(|edge| edge.as_vec3().to_array());
         let id = self.met.len() as u32;
         let mut is_met = false;
-        for row in 0..PACKET_RAYS / ROW {
+        while rows != 0 {
+            let row = rows.trailing_zeros() as usize;
+            rows &= rows - 1;
             let (u, v) = (&self.uv_f32[0][row], &self.uv_f32[1][row]);
-            let (mut sure, mut open) = (0_u32, 0_u32);
+            // How far inside all edges, from the front or from the back.
+            let mut inside = [0.0_f32; ROW];
             for k in 0..ROW {
                 let e0 = x0.mul_add(u[k], y0.mul_add(v[k], z0));
                 let e1 = x1.mul_add(u[k], y1.mul_add(v[k], z1));
@@ -287,8 +360,12 @@ impl RayPacket {
                 let low = if e2 < low { e2 } else { low };
                 let high = if e0 > e1 { e0 } else { e1 };
                 let high = if e2 > high { e2 } else { high };
-                sure |= u32::from((low > slack) | (high < sure_back)) << k;
-                open |= u32::from((low >= -slack) | (high <= open_back)) << k;
+                inside[k] = if (low > -high) | !is_two_sided { low } else { -high };
+            }
+            let (mut sure, mut open) = (0_u32, 0_u32);
+            for k in 0..ROW {
+                sure |= u32::from(inside[k] > slack) << k;
+                open |= u32::from(inside[k] >= -slack) << k;
             }
             // NaN is in neither.
             if open == 0 {
@@ -407,7 +484,7 @@ mod tests {
                     let origin_ned_m = spread_m * DVec3::new(part(i, 0.3), part(i, 0.7), part(i, 0.9));
                     let direction_ned = (centre + 2.0 * across) * [1.0, 1e-3][i % 2];
                     let limit = [f64::INFINITY, 1.1, 1000.0, -1.0][i % 4];
-                    PacketRay { origin_ned_m, direction_ned, limit }
+                    PacketRay { t_s: 0.0, origin_ned_m, direction_ned, limit }
                 });
                 assert!(packet.begin(&rays));
                 mesh.meet_packet(&mut packet, &tree, 7);
@@ -415,7 +492,7 @@ mod tests {
                     let corners = |n: usize| [0, 1, 2].map(|k| mesh.shape.indices[3 * n + k]);
                     let meet = |n: usize| {
                         let points = corners(n).map(|corner| mesh.position_ned_m(corner));
-                        let PacketRay { origin_ned_m, direction_ned, limit } = *ray;
+                        let PacketRay { origin_ned_m, direction_ned, limit, .. } = *ray;
                         let (t, weights) = crate::scene::terrain::intersect_triangle(
                             points,
                             origin_ned_m,
@@ -439,7 +516,7 @@ mod tests {
 
     #[test]
     fn rays_that_go_apart_or_are_not_finite_are_no_packet() {
-        let ray = |direction_ned| PacketRay { origin_ned_m: DVec3::ZERO, direction_ned, limit: 1.0 };
+        let ray = |direction_ned| PacketRay { direction_ned, limit: 1.0, ..PacketRay::NONE };
         let mut packet = RayPacket::default();
         for odd in [-DVec3::X, DVec3::Y, DVec3::ZERO, DVec3::NAN, DVec3::INFINITY] {
             for place in [0, 9, 36, 63] {

@@ -8,10 +8,10 @@
 use camsim_core::{
     camera::CameraModel,
     pose::CameraPose,
-    scene::ray_packet::{PACKET_RAYS, PacketHit, RayPacket},
+    scene::ray_packet::{PACKET_RAYS, PacketHit, PacketRay, RayPacket},
     shutter::RowAxis,
 };
-use camsim_plan::{PHASES, TimedRay};
+use camsim_plan::PHASES;
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -52,15 +52,22 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
             return 1.0;
         }
         let uvs = uvs(&pixels.plan.camera, position, &rays);
-        let of_rays = std::array::from_fn(|k| {
+        let of_rays: [PacketRay; PACKET_RAYS] = std::array::from_fn(|k| {
             let (t_s, CameraPose { position_ned_m, ned_from_camera }) = cameras.of(position)[k];
-            let direction_ned = ned_from_camera * uvs[k]?.extend(1.0);
-            Some(TimedRay { t_s, origin_ned_m: position_ned_m, direction_ned, limit: f64::INFINITY })
+            let to = |uv: DVec2| PacketRay {
+                t_s,
+                origin_ned_m: position_ned_m,
+                direction_ned: ned_from_camera * uv.extend(1.0),
+                limit: f64::INFINITY,
+            };
+            uvs[k].map_or(PacketRay::NONE, to)
         });
         let hits = pixels.rays.first_hits(packet, &of_rays, true);
-        let seen = hits.iter().zip(&of_rays).filter(|(_, ray)| ray.is_some());
-        let is_same = |hit: &Option<PacketHit>| Some(object_of(pixels, hit.map(|hit| hit.surface))) == objects[i];
-        let (same, all) = seen.fold((0_u32, 0_u32), |(same, all), (hit, _)| (same + u32::from(is_same(hit)), all + 1));
+        let seen = hits.iter().zip(&of_rays).filter(|(_, ray)| ray.is_there());
+        let is_same =
+            |hit: &Option<PacketHit>| Some(object_of(pixels, hit.map(|hit| hit.surface))) == objects[i];
+        let (same, all) =
+            seen.fold((0_u32, 0_u32), |(same, all), (hit, _)| (same + u32::from(is_same(hit)), all + 1));
         // Rays fail at the border of the lens's field only.
         if all == 0 { 1.0 } else { same as f32 / all as f32 }
     };
@@ -84,7 +91,8 @@ fn uvs(camera: &CameraModel, pixel: [u32; 2], rays: &[(DVec2, f64)]) -> [Option<
         Some(down[0] * row(&nodes[0])? + down[1] * row(&nodes[1])? + down[2] * row(&nodes[2])?)
     };
     let largest = DVec2::new(0.5, -0.5) / 3.0_f64.sqrt();
-    let off = between(largest).zip(camera.unproject(from_px + largest)).map(|(a, b)| (a - b) * camera.focal_px);
+    let off =
+        between(largest).zip(camera.unproject(from_px + largest)).map(|(a, b)| (a - b) * camera.focal_px);
     let is_quadratic = off.is_some_and(|off| off.length() <= QUADRATIC_PX);
     std::array::from_fn(|k| {
         let (position, _) = rays[k];

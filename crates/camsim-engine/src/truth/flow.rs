@@ -5,9 +5,8 @@ mod parallax;
 use camsim_core::{
     row_time::{FrameCamera, ImagePoint, RowProjector, Shown, WorldPoint},
     scenario::FlowState,
-    scene::ray_packet::{PACKET_RAYS, RayPacket},
+    scene::ray_packet::{PACKET_RAYS, PacketRay, RayPacket},
 };
-use camsim_plan::TimedRay;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -16,6 +15,9 @@ use super::{
     planes::{FramePixels, Pixel},
 };
 use parallax::Doubt;
+
+/// Part of the path to a point that rounding may take for a surface in front of it.
+const LAST_PART: f64 = 1e-6;
 
 /// What a pixel sees, as a point of the world that follows what it is on; the sky is infinitely far away.
 fn world_point<'a>(pixels: &'a FramePixels<'_>, pixel: Pixel<'_>) -> WorldPoint<'a> {
@@ -39,19 +41,21 @@ pub(super) fn flow(pixels: &FramePixels<'_>, target: &FrameCamera) -> Vec<[f32; 
         let mut before = DVec2::ZERO;
         for x in (0..width).step_by(SIDE) {
             let places = square(width, values.len(), [x, 0], 1);
-            let mut rays = [None; PACKET_RAYS];
+            let mut rays = [PacketRay::NONE; PACKET_RAYS];
             let mut is_any_in_doubt = false;
             for (ray, at) in rays.iter_mut().zip(places) {
-                let Some((at, pixel)) = at.and_then(|at| Some((at, pixels.pixel(first + at)?))) else { continue };
+                let Some((at, pixel)) = at.and_then(|at| Some((at, pixels.pixel(first + at)?))) else {
+                    continue;
+                };
                 let is_in_doubt = doubt.is_at(first + at);
                 let landing = Landing { pixels, projector: &projector, pixel, is_in_doubt };
                 let Some((shift, state, open)) = landing.find(before) else { continue };
                 before = shift;
                 values[at] = value(shift, state);
-                *ray = open;
+                *ray = open.unwrap_or(PacketRay::NONE);
                 is_any_in_doubt |= is_in_doubt;
             }
-            if rays.iter().all(Option::is_none) {
+            if !rays.iter().any(PacketRay::is_there) {
                 continue;
             }
             let hits = pixels.rays.first_hits(packet, &rays, is_any_in_doubt);
@@ -80,7 +84,7 @@ struct Landing<'a> {
 impl Landing<'_> {
     /// Displacement, looked for near that of the pixel before, and a ray that decides whether it is hidden there,
     /// if that is open; `None` where there is no displacement.
-    fn find(&self, before: DVec2) -> Option<(DVec2, FlowState, Option<TimedRay>)> {
+    fn find(&self, before: DVec2) -> Option<(DVec2, FlowState, Option<PacketRay>)> {
         let from_px = DVec2::from_array(self.pixel.position.map(f64::from));
         let point = world_point(self.pixels, self.pixel);
         let (px, state, open) = match self.projector.by_steps(point, from_px + before) {
@@ -114,7 +118,7 @@ impl Landing<'_> {
     }
 
     /// The ray to the point; `None` where nothing can hide it.
-    fn ray_to(&self, point: WorldPoint<'_>, shown: &Shown) -> Option<TimedRay> {
+    fn ray_to(&self, point: WorldPoint<'_>, shown: &Shown) -> Option<PacketRay> {
         if !self.is_in_doubt && !self.pixels.rays.has_models() {
             return None;
         }
@@ -123,7 +127,8 @@ impl Landing<'_> {
             WorldPoint::Towards(direction_ned) => direction_ned,
             _ => (point.position_ned_m(t_s)? - position_ned_m) / depth_m,
         };
-        Some(TimedRay::up_to(t_s, position_ned_m, direction_ned, depth_m))
+        let limit = (1.0 - LAST_PART) * depth_m;
+        Some(PacketRay { t_s, origin_ned_m: position_ned_m, direction_ned, limit })
     }
 }
 

@@ -63,19 +63,6 @@ struct RowCamera {
     shift_key_m: DVec3,
 }
 
-impl TimedRay {
-    /// To what is at planar depth `depth_m`, leaving out the last millionth of the path.
-    #[must_use]
-    pub fn up_to(t_s: f64, origin_ned_m: DVec3, direction_ned: DVec3, depth_m: f64) -> Self {
-        Self { t_s, origin_ned_m, direction_ned, limit: (1.0 - LAST_PART) * depth_m }
-    }
-
-    fn untimed(self) -> PacketRay {
-        let Self { origin_ned_m, direction_ned, limit, .. } = self;
-        PacketRay { origin_ned_m, direction_ned, limit }
-    }
-}
-
 impl RowCamera {
     fn new(t_s: f64, pose: CameraPose, key: &CameraPose) -> Self {
         let (key_from_camera, shift_key_m) = pose.relative_to(key);
@@ -101,19 +88,6 @@ pub struct FrameRays<'a> {
     /// and angular rates (camera axes) at mid-exposure.
     at_phases: [OnceLock<Vec<RowCamera>>; PHASES + 1],
     movement: OnceLock<Vec<[DVec3; 2]>>,
-}
-
-/// A ray of a camera at an instant.
-#[derive(Clone, Copy, Debug)]
-pub struct TimedRay {
-    /// Path time, seconds.
-    pub t_s: f64,
-    /// NED, metres.
-    pub origin_ned_m: DVec3,
-    /// NED.
-    pub direction_ned: DVec3,
-    /// Largest ray parameter.
-    pub limit: f64,
 }
 
 /// Equal parts of an exposure at whose ends cameras are kept.
@@ -199,12 +173,12 @@ impl<'a> FrameRays<'a> {
         mut found: impl FnMut(usize, PixelTruth),
     ) {
         let hits_of = |rows: &[RowCamera], packet: &mut RayPacket| {
-            let mut rays = [None; PACKET_RAYS];
+            let mut rays = [PacketRay::NONE; PACKET_RAYS];
             for (ray, pixel) in rays.iter_mut().zip(pixels) {
                 let Some((pixel, uv)) = *pixel else { continue };
                 let (RowCamera { t_s, pose, .. }, direction_ned) = self.ray(rows, pixel, uv);
                 let limit = f64::INFINITY;
-                *ray = Some(TimedRay { t_s: *t_s, origin_ned_m: pose.position_ned_m, direction_ned, limit });
+                *ray = PacketRay { t_s: *t_s, origin_ned_m: pose.position_ned_m, direction_ned, limit };
             }
             self.first_hits(packet, &rays, true)
         };
@@ -222,24 +196,26 @@ impl<'a> FrameRays<'a> {
     pub fn first_hits(
         &self,
         packet: &mut RayPacket,
-        rays: &[Option<TimedRay>; PACKET_RAYS],
+        rays: &[PacketRay; PACKET_RAYS],
         with_terrain: bool,
     ) -> [Option<PacketHit>; PACKET_RAYS] {
         let mut hits = [None; PACKET_RAYS];
-        let is_packet = packet.begin(&rays.map(|ray| ray.map_or(NO_RAY, TimedRay::untimed)));
+        let is_packet = packet.begin(rays);
         if is_packet {
             self.surfaces.meet_still(packet, with_terrain);
         }
-        for (i, ray) in rays.iter().enumerate() {
-            let Some(ray @ TimedRay { t_s, origin_ned_m, direction_ned, limit }) = *ray else { continue };
-            let other = if is_packet {
-                hits[i] = packet.hit(i);
+        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.is_there()) {
+            if !is_packet {
+                hits[i] = self.first_alone(ray, with_terrain).map(|hit| self.packet_hit(&hit));
+                continue;
+            }
+            hits[i] = packet.hit(i);
+            if self.surfaces.moves() {
+                let PacketRay { t_s, origin_ned_m, direction_ned, limit } = *ray;
                 let limit = hits[i].map_or(limit, |hit| hit.t);
-                self.surfaces.moving_hit_at(t_s, origin_ned_m, direction_ned, limit)
-            } else {
-                self.first_alone(&ray, with_terrain)
-            };
-            hits[i] = other.map(|hit| self.packet_hit(&hit)).or(hits[i]);
+                let moving = self.surfaces.moving_hit_at(t_s, origin_ned_m, direction_ned, limit);
+                hits[i] = moving.map(|hit| self.packet_hit(&hit)).or(hits[i]);
+            }
         }
         hits
     }
@@ -296,12 +272,12 @@ impl<'a> FrameRays<'a> {
 
     /// Whether a ray meets a surface, or a model.
     #[must_use]
-    pub fn is_hidden(&self, ray: &TimedRay, with_terrain: bool) -> bool {
+    pub fn is_hidden(&self, ray: &PacketRay, with_terrain: bool) -> bool {
         self.first_alone(ray, with_terrain).is_some()
     }
 
-    fn first_alone(&self, ray: &TimedRay, with_terrain: bool) -> Option<SurfaceHit> {
-        let TimedRay { t_s, origin_ned_m, direction_ned, limit } = *ray;
+    fn first_alone(&self, ray: &PacketRay, with_terrain: bool) -> Option<SurfaceHit> {
+        let PacketRay { t_s, origin_ned_m, direction_ned, limit } = *ray;
         let hit = match with_terrain {
             true => self.surfaces.first_hit_at(t_s, origin_ned_m, direction_ned),
             false => self.surfaces.model_hit_at(t_s, origin_ned_m, direction_ned, limit),
@@ -365,9 +341,5 @@ impl<'a> FrameRays<'a> {
     }
 }
 
-/// A place of a packet without a ray.
-const NO_RAY: PacketRay = PacketRay { origin_ned_m: DVec3::ZERO, direction_ned: DVec3::Z, limit: -1.0 };
-/// Part of the path to a point that rounding may take for a surface in front of it.
-const LAST_PART: f64 = 1e-6;
 /// Relative difference of the depths that the two triangles of an edge give to a ray that hits it: rounding.
 const ON_AN_EDGE: f64 = 1e-9;

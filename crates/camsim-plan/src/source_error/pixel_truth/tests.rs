@@ -140,7 +140,10 @@ fn packets_see_what_single_rays_see() {
             rays.cast_packet(&mut packet, &pixels, |i, seen| {
                 let (pixel, uv) = pixels[i].unwrap();
                 let alone = rays.cast(pixel, uv);
-                assert!(seen.source_px.distance(alone.source_px) < 1e-9, "{pixel:?}: {seen:?}, not {alone:?}");
+                assert!(
+                    seen.source_px.distance(alone.source_px) < 1e-9,
+                    "{pixel:?}: {seen:?}, not {alone:?}"
+                );
                 let id = |truth: &PixelTruth| truth.hit.map(|hit| (hit.surface, hit.triangle));
                 assert_eq!(id(&seen), id(&alone), "{pixel:?}");
                 if let (Some(a), Some(b)) = (seen.hit, alone.hit) {

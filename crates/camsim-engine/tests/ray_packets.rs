@@ -3,14 +3,12 @@
 
 use std::path::PathBuf;
 
-use camsim::{
-    core::{
-        scenario::Channel,
-        scene::ray_packet::{PACKET_RAYS, RayPacket},
-    },
-    io::{load::load_rig, scenario_file::read_rig},
-    plan::{FramePlan, FrameRays, PixelTruth, Planner},
+use camsim_core::{
+    scenario::Channel,
+    scene::ray_packet::{PACKET_RAYS, RayPacket},
 };
+use camsim_io::{load::load_rig, scenario_file::read_rig};
+use camsim_plan::{FramePlan, FrameRays, PixelTruth, Planner};
 
 /// Pixels along a side of a packet.
 const SIDE: usize = 8;
@@ -67,7 +65,7 @@ fn packets_see_what_single_rays_see() {
     let is_long = std::env::var_os("CAMSIM_LONG").is_some();
     let step = if is_long { 1 } else { 37 };
     for scene in ["all_effects", "houses", "scenes/vio_town", "scenes/mapping", "scenes/fisheye"] {
-        let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("benches/{scene}.toml"));
+        let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("../../benches/{scene}.toml"));
         let cameras = load_rig(&read_rig(&file, &[], None).expect("a scenario")).expect("a scene");
         let sequence = cameras[0].sequence.clone();
         let planner = Planner::new(sequence.clone(), &[Channel::Depth], 16_384).expect("a planner");
