@@ -132,14 +132,6 @@ impl<'a> FrameRays<'a> {
         stamp_s + shutter.dt_pixel_s(x, y) + phase * shutter.exposure_pixel_s(x, y)
     }
 
-    /// How far the drawn terrain may be from where it is, pixels of the output frame; 0 without a terrain.
-    #[must_use]
-    pub fn terrain_displacement_px(&self) -> f64 {
-        let FramePlan { camera, ideal, terrain_error_px, .. } = self.plan;
-        let camera_from_ideal = (camera.central_focal_px() / ideal.focal_px).max_element();
-        self.surfaces.terrain().map_or(0.0, |_| terrain_error_px * camera_from_ideal)
-    }
-
     /// What the ray `uv` of a pixel meets.
     #[must_use]
     pub fn cast(&self, pixel: [u32; 2], uv: DVec2) -> PixelTruth {

@@ -1,5 +1,7 @@
 //! The terrain in a packet of rays.
 
+#![expect(clippy::needless_range_loop, reason = "numbers of one vertex have one index in all arrays")]
+
 use glam::DVec3;
 
 use super::{Terrain, TerrainTriangle, cell_triangles, intersect_triangle, tree::BLOCK_CELLS};

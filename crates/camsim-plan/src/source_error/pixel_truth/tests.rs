@@ -134,7 +134,7 @@ fn packets_see_what_single_rays_see() {
                     60..70 => [i, layout - 60],
                     _ => [(i * 37 + layout) % 80, (i * 23 + 7 * layout) % 60],
                 };
-                let is_there = pixel[1] < 60 && (layout < 50 || (i + layout) % 3 > 0);
+                let is_there = pixel[1] < 60 && (layout < 50 || !(i + layout).is_multiple_of(3));
                 is_there.then(|| Some((pixel, plan.camera.unproject_pixel(pixel)?))).flatten()
             });
             rays.cast_packet(&mut packet, &pixels, |i, seen| {
