@@ -18,7 +18,6 @@ pub mod path;
 pub mod silhouette_rays;
 mod stages;
 pub mod supersampled;
-pub mod unreliable_depth;
 
 pub use footprint::{Footprint, Kernel, MAX_AREA_SIDE_PX, TENT_PX2, TapStage, tap_offsets};
 pub use multisample::{SAMPLE_POSITIONS, SAMPLES, resolve_depth};

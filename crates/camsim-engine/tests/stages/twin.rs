@@ -9,7 +9,6 @@ use camsim_core::{
         ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyDepth, PathStage,
         displacement::{RK2_STEP_DEG, linear, rk2},
         gather, path, reproject, reproject_nodes, reproject_with,
-        unreliable_depth::{DepthGrid, changed},
     },
 };
 use camsim_cpu::RowTable;
@@ -50,7 +49,7 @@ pub struct Twin<'a> {
     lens_map: Vec<[f32; 2]>,
     weights: Vec<f32>,
     noise_table: Vec<f32>,
-    /// Independent of the plan: times of rows, and truth where look-ups of depth are unreliable.
+    /// Independent of the plan: times of rows, and the truth of sessions.
     view: FrameView<'a>,
     stamp_s: f64,
 }
@@ -116,37 +115,11 @@ impl<'a> Twin<'a> {
         [i as u32 % width, i as u32 / width]
     }
 
-    /// Sessions cast rays for the truth of pixels whose look-up of depth is unreliable, and from each pixel
-    /// that this corrects on for its neighbours.
+    /// Sessions cast a ray for the truth of every pixel.
     fn complete(&self, pixels: &mut [Option<PixelOutput>]) {
-        let inverse = |depth_m: f64| if depth_m > 0.0 { (1.0 / depth_m) as f32 } else { 0.0 };
-        let inverse_depth: Vec<f32> = pixels
-            .iter()
-            .map(|pixel| inverse(pixel.and_then(|pixel| pixel.depth_m).unwrap_or(0.0)))
-            .collect();
-        let valid: Vec<bool> = pixels.iter().map(Option::is_some).collect();
-        let FramePlan { camera, ideal, terrain_error_px, .. } = self.plan;
-        let camera_from_ideal = (camera.focal_px / ideal.focal_px).max_element();
-        let has_terrain = self.case.sequence.scene.terrain.is_some();
-        let displacement_px = if has_terrain { terrain_error_px * camera_from_ideal } else { 0.0 } as f32;
-        let grid = DepthGrid {
-            width: self.plan.camera.size_px[0] as usize,
-            row_step: if self.plan.shutter.interlace_s() > 0.0 { 2 } else { 1 },
-            inverse_depth: &inverse_depth,
-            valid: &valid,
-            displacement_px,
-        };
-        let mut is_cast = grid.unreliable_pixels();
-        let mut to_cast: Vec<usize> = (0..pixels.len()).filter(|&i| is_cast[i]).collect();
-        while let Some(i) = to_cast.pop() {
-            let Some(pixel) = &mut pixels[i] else { continue };
-            self.cast_truth(self.position(i), pixel);
-            if !changed(inverse_depth[i], inverse(pixel.depth_m.unwrap_or(0.0))) {
-                continue;
-            }
-            let neighbours = grid.neighbours(i).filter(|&neighbour| valid[neighbour]);
-            to_cast.extend(neighbours.filter(|&neighbour| !std::mem::replace(&mut is_cast[neighbour], true)));
-        }
+        pixels.par_iter_mut().enumerate().for_each(|(i, pixel)| {
+            pixel.iter_mut().for_each(|pixel| self.cast_truth(self.position(i), pixel));
+        });
     }
 
     /// Truth by the reference's own rays: at mid-exposure, and at the phase of the source coordinates.
