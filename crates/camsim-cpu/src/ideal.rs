@@ -15,7 +15,7 @@ use camsim_core::{
     pose::CameraPose,
     scene::{Batch, Light, LodTolerance, PlacedMesh, Scene, SceneBatches, Texture, Wrap},
 };
-use camsim_plan::FramePlan;
+use camsim_plan::{EdgeStage, FramePlan, KeyFrame};
 use rayon::prelude::*;
 
 use crate::large_pages::LargeArray;
@@ -40,7 +40,7 @@ mod vertices;
 
 use meshes::{Piece, Scratch, TRIANGLES_PER_CHUNK};
 use multisample::{Multisample, SAMPLES_PER_SIDE};
-pub use raster_frame::RasterFrame;
+pub(crate) use raster_frame::{RasterFrame, Silhouettes};
 use rasterise::{Band, PixelCentres, SKY, SamplePattern};
 use shade::{Material, PixelPlanes, Shader};
 use texture::SurfaceTexture;
@@ -70,6 +70,8 @@ pub(crate) struct RasterScene {
     visible: LargeArray<u32>,
     /// State for frames with several samples per pixel.
     multisample: Multisample,
+    /// Samples for silhouette rays, one a pixel.
+    samples: RasterFrame,
 }
 
 /// Meshes of one shape and material.
@@ -145,12 +147,12 @@ impl RasterScene {
             terrain: Vec::new(),
             visible: LargeArray::default(),
             multisample: Multisample::default(),
+            samples: RasterFrame::default(),
         }
     }
 
-    /// Draws the one ideal frame of a plan.
-    pub fn draw(&mut self, view: DrawInputs<'_>, into: &mut RasterFrame) {
-        let Some(key) = view.plan.keys.first() else { return };
+    /// Draws the ideal frame of a plan's key frame.
+    pub fn draw(&mut self, view: DrawInputs<'_>, key: &KeyFrame, into: &mut RasterFrame) {
         let ideal = &view.plan.ideal;
         let camera = Camera {
             uniforms: ideal_camera(view.plan, &key.pose, base_ned_m(&key.pose), view.scene),
@@ -166,32 +168,46 @@ impl RasterScene {
         let chunk_parts = chunk_parts(parts);
         let context = DrawContext { camera, pose: &key.pose, view, in_view: &in_view };
         match view.plan.samples_a_pixel {
-            1 => self.draw_all(PixelCentres, &context, &chunk_parts, into),
+            1 => self.draw_all(PixelCentres, &context, &chunk_parts, Some(1), into),
             _ => self.draw_samples(
-                &DrawContext { camera: camera.sample_grid(), ..context },
+                &DrawContext { camera: camera.sample_grid(1), ..context },
                 &chunk_parts,
                 into,
             ),
         }
+        into.silhouettes = None;
+        if let EdgeStage::Supersampled { scale, thin, .. } = view.plan.edges {
+            let mut samples = std::mem::take(&mut self.samples);
+            let grid = DrawContext { camera: camera.sample_grid(scale), ..context };
+            let per_pixel = (scale > 1).then_some(SAMPLES_PER_SIDE as u32);
+            self.draw_all(rasterise::SamplePositions, &grid, &chunk_parts, per_pixel, &mut samples);
+            into.add_silhouettes(ideal.size_px, (scale, thin), &samples);
+            self.samples = samples;
+        }
     }
 
-    /// Draws all chunks, in several passes if there are many.
+    /// Draws all chunks, in several passes if there are many. Textures are filtered over so many positions along
+    /// a side; without, there are depths alone.
     fn draw_all<P: SamplePattern>(
         &mut self,
         placements: P,
         context: &DrawContext<'_>,
         chunk_parts: &[Vec<DrawPart>],
+        shaded_px: Option<u32>,
         into: &mut RasterFrame,
     ) {
         let DrawContext { camera, view, .. } = context;
-        into.fit(camera.size_px);
+        into.fit_depth(camera.size_px);
+        if shaded_px.is_some() {
+            into.fit_color();
+        }
         self.visible.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
         for pass in 0..chunk_parts.len().div_ceil(CHUNKS_PER_PASS).max(1) {
             let first = pass * CHUNKS_PER_PASS;
             let chunk_parts = &chunk_parts[first..chunk_parts.len().min(first + CHUNKS_PER_PASS)];
             self.collect(context, chunk_parts, |_| {});
-            self.fill(placements, camera, view.plan, chunk_parts.len(), pass > 0, into);
+            self.fill(placements, context, chunk_parts.len(), shaded_px, pass > 0, into);
         }
     }
 
@@ -203,12 +219,14 @@ impl RasterScene {
         into: &mut RasterFrame,
     ) {
         let DrawContext { camera, view, .. } = context;
-        into.fit(view.plan.ideal.size_px);
+        into.fit_depth(view.plan.ideal.size_px);
+        into.fit_color();
         if chunk_parts.len() > CHUNKS_PER_PASS {
             // The visible triangle of each sample would have to be kept between passes: instead each sample
             // is drawn and shaded as a pixel.
             let mut samples = RasterFrame::default();
-            self.draw_all(rasterise::SamplePositions, context, chunk_parts, &mut samples);
+            let per_pixel = Some(SAMPLES_PER_SIDE as u32);
+            self.draw_all(rasterise::SamplePositions, context, chunk_parts, per_pixel, &mut samples);
             return multisample::resolve_samples(&samples, view.plan.ideal.size_px, into);
         }
         self.visible.fit(into.depth.len());
@@ -347,44 +365,49 @@ impl RasterScene {
         }
     }
 
-    /// Computes depth and colour of every pixel; with `is_overlay` only of pixels where something is nearer
-    /// than before.
+    /// Computes depth and, if `shaded_px` says over how many positions, colour of every pixel; with `is_overlay`
+    /// only of pixels where something is nearer than before.
     fn fill<P: SamplePattern>(
         &mut self,
         placements: P,
-        camera: &Camera,
-        plan: &FramePlan,
+        DrawContext { camera, view, .. }: &DrawContext<'_>,
         chunks: usize,
+        shaded_px: Option<u32>,
         is_overlay: bool,
         into: &mut RasterFrame,
     ) {
-        let (stride, taps) = (into.stride, plan.surface_reads);
-        let pixel_step = camera.size_px[0] as f32 / plan.ideal.size_px[0] as f32;
+        let stride = into.stride;
         let shader = Shader {
             camera,
             chunks: &self.chunks[..chunks],
             materials: &self.materials,
-            taps,
-            pixel_step,
+            taps: view.plan.surface_reads,
+            pixel_step: shaded_px.unwrap_or(1) as f32,
             is_overlay,
         };
         let band_len = stride * BAND_ROWS;
-        let bands = into
-            .depth
-            .par_chunks_mut(band_len)
-            .zip(into.color.par_chunks_mut(CHANNELS * band_len))
-            .zip(self.visible.par_chunks_mut(band_len));
-        bands.enumerate().for_each(|(band, ((depth, color), visible))| {
+        let bands = into.depth.par_chunks_mut(band_len).zip(self.visible.par_chunks_mut(band_len));
+        let fill = |number: usize, depth: &mut [f32], visible: &mut [u32], color: &mut [u16]| {
             if !is_overlay {
                 depth.fill(0.0);
             }
             visible.fill(SKY);
-            let band = Band { number: band, stride, depth, visible };
+            let band = Band { number, stride, depth, visible };
             widest!(vectors => fill_band(vectors, placements, &shader, band, color))
-        });
+        };
+        match shaded_px {
+            Some(_) => bands
+                .zip(into.color.par_chunks_mut(CHANNELS * band_len))
+                .enumerate()
+                .for_each(|(number, ((depth, visible), color))| fill(number, depth, visible, color)),
+            None => {
+                bands.enumerate().for_each(|(number, (depth, visible))| fill(number, depth, visible, &mut []))
+            }
+        }
     }
 }
 
+/// Depths of a band, and colours as far as there is room for them.
 #[inline(always)]
 fn fill_band(
     vectors: impl Vectors,

@@ -8,6 +8,7 @@
 //! * `reverse`: lens map, temporal inverse, gather, photometric stage and truth, vectorised over blocks of
 //!   pixels.
 //! * `general`: the same in double precision, for every plan that `reverse` does not vectorise.
+//! * `silhouettes`: what silhouette rays read of ideal frames, and their march.
 //! * `cast`: ideal frames of every scene and plan, by ray casting.
 //! * `simd`, `large_pages`: vector instructions and huge memory pages, where processor and system have them.
 
@@ -22,6 +23,7 @@ mod ideal;
 mod large_pages;
 mod renderer;
 mod reverse;
+mod silhouettes;
 mod simd;
 
 pub use cast::{Instant, MovingCaster, RayScratch};

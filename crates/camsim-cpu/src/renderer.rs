@@ -4,22 +4,22 @@ use std::{collections::HashMap, sync::Arc};
 
 use camsim_core::{
     camera::CameraModel,
-    scenario::{Face, Preset, Primary},
+    scenario::{Face, Primary},
     scene::{LodTolerance, PlacedMesh, SceneBatches},
     sequence::Sequence,
     temporal::IdealGeometry,
 };
 use camsim_plan::{
-    EdgeStage, FramePlan, RayStage,
-    placement::{cpu_rasterises, cpu_vectorises},
+    FramePlan, RayStage,
+    placement::{cpu_draws, cpu_rasterises, cpu_takes_copies, cpu_vectorises},
     uniforms::{FrameUniforms, Truth},
 };
 
 use crate::{
     cast::CastScene,
-    general::{self, FrameInputs, IdealImage, RowTable},
+    general::{self, FrameInputs, IdealImage, Repaint, RowTable},
     ideal::{DrawInputs, RasterFrame, RasterScene},
-    reverse::{IdealTexels, Kernel, KernelInputs, LensMap},
+    reverse::{EdgeTiles, IdealTexels, Kernel, KernelFrame, KernelInputs, LensMap},
 };
 
 /// Number of buffers for ideal frames of a camera without faces: one for the current frame, one for the next. A
@@ -57,8 +57,8 @@ pub struct CpuRenderer {
 #[derive(Debug, Default)]
 struct KeyFrames {
     size_px: [u32; 2],
-    /// The rasterised key frame.
-    drawn: RasterFrame,
+    /// The key frames, if they were rasterised.
+    drawn: Vec<RasterFrame>,
     /// All key frames, if they were cast; else empty.
     cast: Vec<IdealImage>,
 }
@@ -113,12 +113,12 @@ impl CpuRenderer {
         self.sequence = sequence;
     }
 
-    /// Draws the ideal frames of a plan: by the rasteriser if it supports them, else by ray casting. It
-    /// overwrites those drawn before the last ones.
+    /// Draws the ideal frames of a plan: by the rasteriser if it supports them, else by ray casting. `terrain`
+    /// has the triangles that each shows, if there is one. It overwrites those drawn before the last ones.
     pub fn draw_ideal(
         &mut self,
         plan: &FramePlan,
-        terrain: Option<&PlacedMesh>,
+        terrain: &[PlacedMesh],
         tolerance: &LodTolerance,
     ) -> BufferHandle {
         // The frame in flight may still read the other buffer.
@@ -133,18 +133,20 @@ impl CpuRenderer {
         let ideal = &mut self.buffers[buffer];
         ideal.size_px = plan.ideal.size_px;
         ideal.cast.clear();
-        let is_plain = plan.keys.len() == 1 && plan.edges == EdgeStage::None && plan.preset != Preset::Paper;
-        if self.general_only || !(self.rasterises && is_plain) {
+        if self.general_only || !(self.rasterises && cpu_draws(plan)) {
             let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
             ideal.cast.extend(plan.keys.iter().map(|key| cast.draw(plan, key)));
             return BufferHandle(buffer);
         }
         let raster = self.raster.get_or_insert_with(|| RasterScene::new(scene, &self.meshes));
-        let view = DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance };
-        raster.draw(view, &mut ideal.drawn);
-        if let (Some(_), Some(key)) = (plan.shadows, plan.keys.first()) {
-            let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
-            cast.add_shadows(plan, key, &mut ideal.drawn);
+        ideal.drawn.resize_with(plan.keys.len(), RasterFrame::default);
+        for (number, (key, drawn)) in plan.keys.iter().zip(&mut ideal.drawn).enumerate() {
+            let terrain = terrain.get(number);
+            raster.draw(DrawInputs { plan, scene, batches: &self.meshes, terrain, tolerance }, key, drawn);
+            if plan.shadows.is_some() {
+                let cast = self.cast.get_or_insert_with(|| CastScene::new(scene));
+                cast.add_shadows(plan, key, drawn);
+            }
         }
         BufferHandle(buffer)
     }
@@ -154,9 +156,9 @@ impl CpuRenderer {
     #[must_use]
     pub fn ideal_images(&self, BufferHandle(buffer): BufferHandle) -> (Vec<f32>, Vec<f32>) {
         let ideal = &self.buffers[buffer];
-        match ideal.cast.first() {
-            Some(image) => (image.color_rgba.clone(), image.inverse_depth.clone()),
-            None => ideal.drawn.images(ideal.size_px),
+        match (ideal.cast.first(), ideal.drawn.first()) {
+            (Some(image), _) => (image.color_rgba.clone(), image.inverse_depth.clone()),
+            (None, drawn) => drawn.map(|drawn| drawn.images(ideal.size_px)).unwrap_or_default(),
         }
     }
 
@@ -171,22 +173,24 @@ impl CpuRenderer {
         self.fit_lens_map(plan);
         let ideal = &self.buffers[buffer];
         match inputs.rows {
-            RowTable::Poses(poses) if cpu_vectorises(plan) && !self.general_only => {
-                match ideal.cast.first() {
-                    None => self.vectorised(inputs, &poses.entries, ideal.drawn.texels()),
-                    Some(image) => {
-                        let drawn = RasterFrame::from_image(image);
-                        self.vectorised(inputs, &poses.entries, drawn.texels())
-                    }
-                }
+            RowTable::Poses(_) if cpu_vectorises(plan) && !self.general_only => match &*ideal.cast {
+                [] => self.reverse_rasterised(inputs, &ideal.drawn),
+                cast => self.reverse_rasterised(
+                    inputs,
+                    &cast.iter().map(RasterFrame::from_image).collect::<Vec<_>>(),
+                ),
+            },
+            _ if ideal.cast.is_empty() => {
+                let images: Vec<_> = ideal.drawn.iter().map(|drawn| image_of(drawn, &plan.ideal)).collect();
+                self.general(inputs, &images)
             }
-            _ if ideal.cast.is_empty() => self.general(inputs, &[image_of(&ideal.drawn, &plan.ideal)]),
             _ => self.general(inputs, &ideal.cast),
         }
     }
 
-    /// Output frame of a [vectorised](cpu_vectorises) plan from an ideal frame that another renderer has
-    /// drawn: linear R G B A, row-major, and the truth if the plan has it. `None` for other plans.
+    /// Output frame of a plan that the cpu [makes from copies](camsim_plan::placement::cpu_takes_copies), from
+    /// the ideal frame that another renderer has drawn: linear R G B A, row-major, and the truth if the plan has
+    /// it. `None` for other plans.
     pub fn reverse_from(
         &mut self,
         inputs: &ReverseInputs<'_>,
@@ -197,31 +201,55 @@ impl CpuRenderer {
             RowTable::Poses(_) if self.general_only => {
                 Some(self.general(inputs, &[image_of_texels(&ideal, &inputs.plan.ideal)]))
             }
-            RowTable::Poses(poses) => Some(self.vectorised(inputs, &poses.entries, ideal)),
-            RowTable::Times(_) => None,
+            RowTable::Poses(_) if cpu_takes_copies(inputs.plan) => {
+                let frame = self.vectorised(inputs, &[ideal], &[]);
+                Some((frame.color_rgba, frame.truth))
+            }
+            _ => None,
         }
+    }
+
+    /// Output frame of a vectorised plan from rasterised ideal frames.
+    fn reverse_rasterised(
+        &self,
+        inputs: &ReverseInputs<'_>,
+        drawn: &[RasterFrame],
+    ) -> (Vec<f32>, Option<Vec<Truth>>) {
+        let frame_inputs = self.frame_inputs(inputs);
+        let repaint = Repaint::new(inputs.plan, &self.sequence, drawn, &frame_inputs);
+        let edges = repaint.as_ref().map(Repaint::edges).unwrap_or_default();
+        let texels: Vec<IdealTexels<'_>> = drawn.iter().map(RasterFrame::texels).collect();
+        let mut frame = self.vectorised(inputs, &texels, &edges);
+        if let Some(repaint) = repaint {
+            repaint.paint(&mut frame);
+        }
+        (frame.color_rgba, frame.truth)
     }
 
     fn vectorised(
         &self,
         inputs: &ReverseInputs<'_>,
-        poses: &[[[f32; 4]; 3]],
-        ideal: IdealTexels<'_>,
-    ) -> (Vec<f32>, Option<Vec<Truth>>) {
-        let &ReverseInputs { plan, uniforms, .. } = inputs;
+        ideals: &[IdealTexels<'_>],
+        edges: &[EdgeTiles],
+    ) -> KernelFrame {
+        let &ReverseInputs { plan, uniforms: frame, rows } = inputs;
+        let poses = if let RowTable::Poses(poses) = rows { &poses.entries[..] } else { &[] };
         let (map, vignette, leaves_truth) = (self.lens_map(plan), &self.vignette[..], self.leaves_truth);
-        let inputs = KernelInputs { frame: uniforms, poses, map, vignette, ideal, leaves_truth };
+        let inputs = KernelInputs { frame, poses, map, vignette, ideals, edges, leaves_truth };
         self.kernel.render(plan, &inputs)
     }
 
     fn general(&self, inputs: &ReverseInputs<'_>, ideal: &[IdealImage]) -> (Vec<f32>, Option<Vec<Truth>>) {
-        let frame = FrameInputs {
+        general::render(inputs.plan, &self.sequence, ideal, &self.frame_inputs(inputs))
+    }
+
+    fn frame_inputs<'a>(&'a self, inputs: &ReverseInputs<'a>) -> FrameInputs<'a> {
+        FrameInputs {
             rows: inputs.rows,
             lens_map: self.lens_map(inputs.plan).map_or(&[][..], LensMap::rays),
             vignette: if self.vignette.len() > 1 { &self.vignette } else { &[] },
             coords_phase: inputs.uniforms.coords_phase,
-        };
-        general::render(inputs.plan, &self.sequence, ideal, &frame)
+        }
     }
 
     /// Makes the lens map of a plan, unless it is cached.
@@ -243,7 +271,8 @@ impl CpuRenderer {
 /// Converts a rasterised ideal frame for the general pass.
 fn image_of(drawn: &RasterFrame, geometry: &IdealGeometry) -> IdealImage {
     let (color_rgba, inverse_depth) = drawn.images(geometry.size_px);
-    IdealImage { geometry: *geometry, color_rgba, inverse_depth, fine: None }
+    let fine = drawn.silhouettes.as_ref().map(|silhouettes| silhouettes.fine.clone());
+    IdealImage { geometry: *geometry, color_rgba, inverse_depth, fine }
 }
 
 /// A copied ideal frame in the form that the general pass reads.

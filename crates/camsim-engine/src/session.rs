@@ -281,8 +281,7 @@ impl<'a> Session<'a> {
             lane.ideal = Some(CachedFrames { key: key.clone(), lod, buffer: None });
             if key.renderer == Renderer::Cpu {
                 let begin = Instant::now();
-                let terrain = prepared.meshes.first();
-                let buffer = self.cpu.draw_ideal(plan, terrain, &key.models);
+                let buffer = self.cpu.draw_ideal(plan, &prepared.meshes, &key.models);
                 lane.ideal.iter_mut().for_each(|ideal| ideal.buffer = Some(buffer));
                 times.ideal_ms = Some(ms_since(begin));
             }

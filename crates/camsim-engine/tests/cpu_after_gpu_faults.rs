@@ -15,7 +15,7 @@ use camsim_core::scenario::{
 };
 use camsim_engine::{Engine, Finished, Session};
 use camsim_plan::Backend;
-use camsim_plan::placement::cpu_vectorises;
+use camsim_plan::placement::cpu_takes_copies;
 use common::{city, engine, pattern, scenario, sequence, steady};
 use glam::DVec3;
 
@@ -97,9 +97,11 @@ fn a_failed_gpu_pass_changes_no_other_frame() {
     engine.set_backend(Backend::GpuThenCpu);
     let mut whole = session(&engine);
     let (expected, all) = render(&mut whole, &OVER_GROUND);
-    assert!(all && expected.iter().all(|done| cpu_vectorises(&done.plan) && done.times.reverse_ms.is_some()));
     assert!(
-        !cpu_vectorises(&whole.planner().plan(OVER_HOUSES).expect("a plan")),
+        all && expected.iter().all(|done| cpu_takes_copies(&done.plan) && done.times.reverse_ms.is_some())
+    );
+    assert!(
+        !cpu_takes_copies(&whole.planner().plan(OVER_HOUSES).expect("a plan")),
         "silhouette rays are the gpu's"
     );
     let same = |finished: &[Finished]| {

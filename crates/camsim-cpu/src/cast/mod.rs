@@ -17,7 +17,7 @@ use glam::{DVec2, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
-use crate::general::{FineSamples, IdealImage};
+use crate::{general::IdealImage, silhouettes::FineSamples};
 
 mod mips;
 mod moving;
@@ -112,7 +112,7 @@ impl CastScene {
                 frame.samples(size_px.map(|side| side * scale), border_rays)
             }
         };
-        FineSamples::new(size_px, inverse_depth, (scale, thin), depths, colors)
+        FineSamples::of_quads(size_px, inverse_depth, (scale, thin), &depths, colors)
     }
 }
 

@@ -43,7 +43,7 @@ impl CastScene {
         let Some(shadows) = plan.shadows else { return };
         let mut caster = FrameCaster::without_textures(self, plan, key, 1);
         let [width, height] = plan.ideal.size_px.map(|side| side as usize);
-        let RasterFrame { color, depth, stride } = frame;
+        let RasterFrame { color, depth, stride, .. } = frame;
         let mut middles = vec![Middle::default(); width * height];
         let depths = depth.par_chunks(*stride);
         middles.par_chunks_mut(width).zip(depths).enumerate().for_each_init(

@@ -5,11 +5,10 @@ use camsim_plan::FramePlan;
 use glam::{DVec2, DVec3};
 
 use super::{
-    IdealImage,
     rows::{Pose, Rows},
-    silhouettes::SilhouetteImage,
     solver::DepthLookup,
 };
+use crate::silhouettes::{Colors, KeyImage, SilhouetteImage};
 
 /// An ideal frame in the form that the stages read.
 #[derive(Debug)]
@@ -32,24 +31,26 @@ pub(super) struct ReferencePoint {
 
 impl<'a> Key<'a> {
     /// The key frame of a number.
-    pub fn new(plan: &FramePlan, number: usize, image: &'a IdealImage, rows: &Rows) -> Self {
-        let [width, height] = image.geometry.size_px.map(|side| side as usize);
+    pub fn new(plan: &FramePlan, number: usize, image: KeyImage<'a>, rows: &Rows) -> Self {
+        let size_px = image.geometry.size_px;
+        let [width, height] = size_px.map(|side| side as usize);
+        let rgba = if let Colors::Floats(rgba) = image.colors { rgba } else { &[] };
         assert!(
-            image.inverse_depth.len() == width * height && image.color_rgba.len() == 4 * width * height,
+            image.inverse_depth.len() == width * height
+                && (rgba.is_empty() || rgba.len() == 4 * width * height),
             "an ideal frame of {width}x{height} pixels"
         );
-        let size_px = image.geometry.size_px;
         let depth = DepthLookup {
-            ideal: &image.geometry,
-            image: InverseDepthImage { size_px, values: &image.inverse_depth },
+            ideal: image.geometry,
+            image: InverseDepthImage { size_px, values: image.inverse_depth },
             plane: plan.plane.seen_from(&plan.keys[number].pose),
             sky_reach_px: plan.sky_reach_px,
         };
         Self {
-            color: ColorImage { size_px, rgba: &image.color_rgba },
+            color: ColorImage { size_px, rgba },
             depth,
             reference: rows.reference(number),
-            silhouettes: image.fine.as_ref().map(|fine| SilhouetteImage::new(plan, image, fine)),
+            silhouettes: image.fine.map(|fine| SilhouetteImage::new(image, fine, plan.mark_reach_px())),
         }
     }
 

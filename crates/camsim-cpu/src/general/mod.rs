@@ -33,8 +33,14 @@ use rays::{Ray, Rays};
 use rows::{Exposure, Rows};
 use solver::Solver;
 
+use crate::{
+    ideal::{RasterFrame, Silhouettes},
+    reverse::{EdgeTiles, KernelFrame, Listed},
+    silhouettes::{Colors, FineSamples, KeyImage},
+    simd::lanes::LANES,
+};
+
 pub use rows::RowTable;
-pub use silhouettes::FineSamples;
 
 /// An ideal frame.
 #[derive(Clone, Debug)]
@@ -74,7 +80,7 @@ pub fn render(
     ideal: &[IdealImage],
     inputs: &FrameInputs<'_>,
 ) -> (Vec<f32>, Option<Vec<Truth>>) {
-    let pass = ReversePass::new(plan, sequence, ideal, inputs);
+    let pass = ReversePass::new(plan, sequence, images(ideal), inputs);
     let [width, height] = plan.camera.size_px.map(|side| side as usize);
     let mut picture = vec![[0.0; 4]; width * height];
     let mut truth = vec![Truth::default(); if plan.truth { width * height } else { 0 }];
@@ -95,6 +101,63 @@ pub fn render(
         ),
     }
     (picture.into_flattened(), plan.truth.then_some(truth))
+}
+
+fn images<'a>(ideal: &'a [IdealImage]) -> Vec<KeyImage<'a>> {
+    let image = |image: &'a IdealImage| {
+        let IdealImage { geometry, color_rgba, inverse_depth, fine } = image;
+        KeyImage { geometry, colors: Colors::Floats(color_rgba), inverse_depth, fine: fine.as_ref() }
+    };
+    ideal.iter().map(image).collect()
+}
+
+/// Gives the pixels that may see several surfaces rays of their own, where the vectorised pass has made a frame
+/// from rasterised key frames.
+#[derive(Debug)]
+pub(crate) struct Repaint<'a>(ReversePass<'a>);
+
+impl<'a> Repaint<'a> {
+    /// `None` without key frames that silhouette rays can read.
+    pub fn new(
+        plan: &'a FramePlan,
+        sequence: &'a Sequence,
+        ideal: &'a [RasterFrame],
+        inputs: &FrameInputs<'a>,
+    ) -> Option<Self> {
+        let image = |frame: &'a RasterFrame| {
+            let Silhouettes { inverse_depth, fine } = frame.silhouettes.as_ref()?;
+            let colors = Colors::Halves(&frame.color, frame.stride);
+            Some(KeyImage { geometry: &plan.ideal, colors, inverse_depth, fine: Some(fine) })
+        };
+        Some(Self(ReversePass::new(plan, sequence, ideal.iter().map(image).collect::<Option<_>>()?, inputs)))
+    }
+
+    /// Where each key frame has edge pixels.
+    pub fn edges(&self) -> Vec<EdgeTiles> {
+        self.0.keys.iter().filter_map(|key| Some(key.silhouettes.as_ref()?.edge_tiles())).collect()
+    }
+
+    /// Replaces colour and truth of the listed pixels that see several surfaces.
+    pub fn paint(&self, frame: &mut KernelFrame) {
+        let width = self.0.plan.camera.size_px[0] as usize;
+        let mut truth = frame.truth.as_deref_mut().unwrap_or_default().chunks_mut(width);
+        let listed = frame.listed.chunks(width.div_ceil(LANES));
+        let rows = frame.color_rgba.chunks_mut(4 * width).zip(listed).zip(0..);
+        let rows: Vec<_> = rows.map(|row| (row, truth.next().unwrap_or_default())).collect();
+        rows.into_par_iter().for_each(|(((colors, listed), y), truth)| {
+            for (block, Listed { touched, near }) in listed.iter().enumerate() {
+                let mut left = touched | near;
+                while left != 0 {
+                    let lane = left.trailing_zeros();
+                    left &= left - 1;
+                    let x = block * LANES + lane as usize;
+                    let is_touched = touched >> lane & 1 == 1;
+                    let rgb = &mut colors[4 * x..4 * x + 3];
+                    self.0.repaint([x as u32, y], is_touched, rgb, truth.get_mut(x));
+                }
+            }
+        });
+    }
 }
 
 /// The state shared by all pixels of a frame.
@@ -128,7 +191,7 @@ impl<'a> ReversePass<'a> {
     fn new(
         plan: &'a FramePlan,
         sequence: &'a Sequence,
-        ideal: &'a [IdealImage],
+        ideal: Vec<KeyImage<'a>>,
         inputs: &FrameInputs<'a>,
     ) -> Self {
         assert_eq!(ideal.len(), plan.keys.len(), "an ideal frame for each key frame");
@@ -138,7 +201,7 @@ impl<'a> ReversePass<'a> {
             "a vignette of the camera's size"
         );
         let rows = Rows::new(plan, inputs.rows);
-        let keys = ideal.iter().enumerate().map(|(number, image)| Key::new(plan, number, image, &rows));
+        let keys = ideal.into_iter().enumerate().map(|(number, image)| Key::new(plan, number, image, &rows));
         Self {
             plan,
             rays: Rays::new(&plan.camera, plan.ray, inputs.lens_map),
@@ -197,6 +260,25 @@ impl<'a> ReversePass<'a> {
             false => Truth::default(),
         };
         Some(([r, g, b, 1.0], truth))
+    }
+
+    /// Replaces linear R G B and truth of a pixel that sees several surfaces; `marked` says whether its plain
+    /// gather touched an edge pixel.
+    fn repaint(&self, position: [u32; 2], marked: bool, rgb: &mut [f32], truth: Option<&mut Truth>) {
+        let Some(ray) = self.rays.ray(position) else { return };
+        let key = nearest_first(self.rows.fractions(position)[0], self.keys.len()).next().unwrap_or_default();
+        let pixel = Pixel { position, ray, key, exposure: self.rows.exposure(key, position) };
+        let Exposure { nodes: [first, .., last] | [first @ last], .. } = pixel.exposure else { return };
+        let ideal = self.keys[key].ideal();
+        let far_px =
+            [first, last].map(|pose| ideal.px_from_point(self.gather.solver.point(ray.uv, pose, 0.0)));
+        let Some(silhouette) = self.silhouette(&pixel, far_px, marked) else { return };
+        if let Some(color) = self.color_of_rays(&pixel, silhouette) {
+            rgb.copy_from_slice(&self.output_color(&pixel, color, self.vignette_weight(position)));
+        }
+        if let Some(truth) = truth.filter(|_| self.is_truth_unknown(&pixel)) {
+            *truth = truth::unknown(&pixel);
+        }
     }
 
     fn vignette_weight(&self, [x, y]: [u32; 2]) -> f32 {

@@ -16,14 +16,14 @@ struct VisiblePoint {
 impl ReversePass<'_> {
     /// Truth of a pixel by the temporal inverse; near silhouettes by its centre ray.
     pub(super) fn truth(&self, pixel: &Pixel<'_>, may_see_several: bool, nodes_px: &mut Vec<DVec2>) -> Truth {
-        let near = |fraction: f64| may_see_several && self.is_near_silhouette(pixel, fraction);
-        let phase_fraction = self.coords_phase + 0.5;
         if self.gather.solver.is_exact() {
-            if near(0.5) || near(phase_fraction) {
-                return Truth { depth_m: -1.0, ..truth_of_ray(pixel) };
+            if may_see_several && self.is_truth_unknown(pixel) {
+                return unknown(pixel);
             }
             return self.truth_of(pixel, self.smooth_px(pixel, nodes_px), &self.smooth_mid(pixel));
         }
+        let near = |fraction: f64| may_see_several && self.is_near_silhouette(pixel, fraction);
+        let phase_fraction = self.coords_phase + 0.5;
         let source_px = match near(phase_fraction).then(|| self.centre_hit(pixel, phase_fraction)).flatten() {
             // These solvers have one key frame, that of the mid-window camera.
             Some((position_px, _)) => position_px,
@@ -37,6 +37,11 @@ impl ReversePass<'_> {
             None => self.smooth_mid(pixel),
         };
         self.truth_of(pixel, source_px, &mid)
+    }
+
+    /// Whether a pixel's centre ray passes a silhouette when it is asked for.
+    pub(super) fn is_truth_unknown(&self, pixel: &Pixel<'_>) -> bool {
+        [0.5, self.coords_phase + 0.5].into_iter().any(|fraction| self.is_near_silhouette(pixel, fraction))
     }
 
     /// Source at the exposure phase of the coordinates, in the mid-window camera.
@@ -69,6 +74,11 @@ impl ReversePass<'_> {
         }
         truth
     }
+}
+
+/// Truth that is left to a ray in double precision.
+pub(super) fn unknown(pixel: &Pixel<'_>) -> Truth {
+    Truth { depth_m: -1.0, ..truth_of_ray(pixel) }
 }
 
 fn truth_of_ray(pixel: &Pixel<'_>) -> Truth {

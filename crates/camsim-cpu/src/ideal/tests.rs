@@ -131,7 +131,7 @@ fn small_mesh_triangles_are_dropped_only_if_they_cover_no_position() {
     let model = TriangleKind { material: 1, ..KIND };
     let sample_grid = Camera {
         size_px: SIZE_PX,
-        ..Camera { focal_px: [50.0; 2], principal_px: [79.5, 59.5], ..camera() }.sample_grid()
+        ..Camera { focal_px: [50.0; 2], principal_px: [79.5, 59.5], ..camera() }.sample_grid(1)
     };
     for (name, triangles, _) in walls() {
         let (on_ground, on_model, kinds) =

@@ -50,12 +50,13 @@ impl<const N: usize> Vertex<N> {
 }
 
 impl Camera {
-    /// Camera of the sample grid: 2x2 pixels per pixel, one per sample.
-    pub fn sample_grid(&self) -> Self {
+    /// Camera of the sample grid: a pixel per sample, 2x2 of them for each of `scale` x `scale` fine pixels.
+    pub fn sample_grid(&self, scale: u32) -> Self {
+        let times = 2.0 * scale as f32;
         Self {
-            focal_px: self.focal_px.map(|px| 2.0 * px),
-            principal_px: self.principal_px.map(|px| 2.0 * px + 0.5),
-            size_px: self.size_px.map(|side| 2 * side),
+            focal_px: self.focal_px.map(|px| times * px),
+            principal_px: self.principal_px.map(|px| times * px + 0.5 * (times - 1.0)),
+            size_px: self.size_px.map(|side| 2 * scale * side),
             sample_offset: SUBPIXELS / 2,
             ..*self
         }

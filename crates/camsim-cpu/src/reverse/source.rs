@@ -107,7 +107,7 @@ impl Stages<'_> {
     /// Depth look-ups from the key frame's plane.
     #[inline(always)]
     fn iterate_depth(&self, direction: &Lanes3, shift: [f32; 3]) -> (Lanes, Lanes) {
-        let [a, b, c, _] = self.frame.planes[0];
+        let [a, b, c, _] = self.frame.planes[self.key];
         let distance_ratio = 1.0 - (a * shift[0] + b * shift[1] + c * shift[2]);
         let guess = match distance_ratio > 1e-3 {
             true => per_lane(|i| {

@@ -80,13 +80,13 @@ impl Stages<'_> {
             x: per_lane(|i| (position_px.x[i] - cx) / fx),
             y: per_lane(|i| (position_px.y[i] - cy) / fy),
         };
-        let Some(pose) = self.reference_pose else {
+        let Some(pose) = self.reference_poses.get(self.key) else {
             return BlockReferencePoint {
                 ray: Lanes3 { x: uv.x, y: uv.y, z: [1.0; LANES] },
                 inverse_depth: *key_inverse_depth,
             };
         };
-        let (ray, shift) = (rotate(&pose, &uv), translation(&pose));
+        let (ray, shift) = (rotate(pose, &uv), translation(pose));
         let moved = |axis: &Lanes, shift: f32| per_lane(|i| key_inverse_depth[i].mul_add(shift, axis[i]));
         BlockReferencePoint {
             ray: Lanes3 {
@@ -101,7 +101,7 @@ impl Stages<'_> {
     /// Source position in the ideal frame that the mid-window camera would have, pixels.
     #[inline(always)]
     fn reference_px(&self, position_px: &Lanes2) -> Lanes2 {
-        if self.reference_pose.is_none() {
+        if self.reference_poses.is_empty() {
             return *position_px;
         }
         let key_inverse_depth = self.ideal.inverse_depth(self.frame, position_px);

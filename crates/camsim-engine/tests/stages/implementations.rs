@@ -214,7 +214,7 @@ fn renderer_output(
         travel_m: 0.0,
         parallax_px: 0.0,
     };
-    let buffer = renderer.draw_ideal(plan, finest_terrain(sequence, plan).as_ref(), &tolerance);
+    let buffer = renderer.draw_ideal(plan, &finest_terrain(sequence, plan), &tolerance);
     let (mut color_rgba, inverse_depth) = renderer.ideal_images(buffer);
     let lod = LodSelection::default();
     if is_ideal {
@@ -256,11 +256,14 @@ fn pixel_output(rgba: &[f32; 4], truth: &Truth, plan: &FramePlan) -> PixelOutput
 }
 
 /// The terrain at full detail.
-fn finest_terrain(sequence: &Sequence, plan: &FramePlan) -> Option<PlacedMesh> {
-    let (terrain, pose) = (sequence.scene.terrain.as_ref()?, &plan.keys[0].pose);
-    let detail =
-        TerrainDetail::new(terrain, pose, plan.ideal.tangents(), plan.ideal.focal_px.max_element(), 1e-6);
-    Some(detail.visible_mesh().placed(terrain, base_ned_m(pose)))
+fn finest_terrain(sequence: &Sequence, plan: &FramePlan) -> Vec<PlacedMesh> {
+    let (tangents, focal_px) = (plan.ideal.tangents(), plan.ideal.focal_px.max_element());
+    let of_key = |terrain, pose| {
+        let detail = TerrainDetail::new(terrain, pose, tangents, focal_px, 1e-6);
+        detail.visible_mesh().placed(terrain, base_ned_m(pose))
+    };
+    let terrain = sequence.scene.terrain.iter();
+    terrain.flat_map(|terrain| plan.keys.iter().map(|key| of_key(terrain, &key.pose))).collect()
 }
 
 /// An ideal frame as it is compared.

@@ -6,7 +6,7 @@ use camsim_core::frame::RenderedFrame;
 use camsim_engine::{AdapterChoice, Engine, Finished};
 use camsim_plan::{
     Backend,
-    placement::{cpu_rasterises, cpu_vectorises},
+    placement::{cpu_rasterises, cpu_takes_copies},
 };
 
 use super::subjects::Subject;
@@ -96,7 +96,7 @@ pub fn render(engines: &Engines, subject: &Subject) -> [Vec<RenderedFrame>; 2] {
         finished
     };
     let from_gpu = frames_of(&engines.gpu, &subject.frames);
-    let is_served = |done: &&Finished| cpu_vectorises(&done.plan);
+    let is_served = |done: &&Finished| cpu_takes_copies(&done.plan);
     let served: Vec<u64> = from_gpu.iter().filter(is_served).map(|done| done.frame.index).collect();
     let max_picture_px = engines.gpu.capabilities().max_picture_px;
     let by_cpu = match cpu_rasterises(&sequence.scene, max_picture_px) {

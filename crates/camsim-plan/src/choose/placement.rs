@@ -3,7 +3,7 @@
 //! | machine | ideal frames | output frames |
 //! |---|---|---|
 //! | graphics card | gpu | gpu |
-//! | software adapter | cpu, vectorised, where it can draw the scene; else gpu | cpu, vectorised, where it can make the plan; else gpu |
+//! | software adapter | cpu, vectorised, where it can draw the scene; else gpu | cpu, vectorised, from one ideal frame without silhouette rays; else gpu |
 //! | no adapter, or `--backend cpu` | cpu | cpu |
 //!
 //! Shadows of the sun are made by the cpu: a frame of a scene with shadows has all its passes there, whatever
@@ -22,11 +22,13 @@ use camsim_core::{
 use crate::ir::{
     frame_plan::FramePlan,
     placement::{AdapterClass, Backend, Capabilities, Placement, Renderer},
-    stages::{RayStage, TemporalStage},
+    stages::{EdgeStage, RayStage, TemporalStage, scale_of},
 };
 
 /// Reads of one grid of taps that the vectorised cpu pass makes, at most.
 pub const MOST_VECTOR_TAPS: u32 = 8;
+/// Side of an ideal frame, in samples, up to which the coordinates of the cpu's rasteriser reach.
+const MOST_RASTER_SIDE: u32 = 1 << 15;
 /// Pixels of an ideal frame for each pixel of the frames made from it, at most, that are worth a copy from a
 /// software adapter to the cpu renderer.
 const MOST_COPIED: f64 = 12.0;
@@ -43,7 +45,7 @@ pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: b
         (Backend::Cpu, _) | (_, None) => cpu,
         (Backend::Gpu, _) => gpu,
         (Backend::GpuThenCpu, _) => {
-            if cpu_vectorises(plan) {
+            if cpu_takes_copies(plan) {
                 gpu_then_cpu
             } else {
                 gpu
@@ -51,7 +53,9 @@ pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: b
         }
         (Backend::Auto, Some(AdapterClass::Card)) => gpu,
         (Backend::Auto, Some(AdapterClass::Software)) => {
-            if !capabilities.has_vectors || !cpu_vectorises(plan) {
+            // All other plans stay with the adapter, also those that the cpu vectorises: nothing says yet that it
+            // takes less time for them.
+            if !capabilities.has_vectors || !cpu_takes_copies(plan) {
                 gpu
             } else if rasterises {
                 cpu
@@ -64,24 +68,39 @@ pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: b
     }
 }
 
-/// Whether the cpu's vectorised reverse pass makes frames of a plan: from one ideal frame, without silhouette
-/// rays, by a lens that does not zoom, rows that are rows of the picture, a solver that iterates on the depth
-/// or needs none, and grids of at most [`MOST_VECTOR_TAPS`] taps. Its general pass makes all others.
+/// Whether the cpu's vectorised reverse pass makes frames of a plan: by rows that are rows of the picture, a
+/// solver that iterates on the depth or needs none, and grids of at most [`MOST_VECTOR_TAPS`] taps. Its general
+/// pass makes all others.
 #[must_use]
 pub fn cpu_vectorises(plan: &FramePlan) -> bool {
-    let is_plain = plan.keys.len() <= 1 && !plan.edges.has_rays() && plan.preset != Preset::Paper;
     let solves = matches!(
         plan.temporal,
         TemporalStage::Identity | TemporalStage::Rotation | TemporalStage::Reproject { .. }
     );
-    let keeps_lens = plan.ray == RayStage::Pinhole || (plan.ray == RayStage::LensMap && plan.zoom.is_none());
+    let has_map = plan.ray != RayStage::GaussNewton;
     let has_rows = plan.shutter.row_axis() == RowAxis::Rows;
     let has_few_taps = match plan.taps {
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most <= MOST_VECTOR_TAPS,
         TapStage::Bilinear | TapStage::Spline | TapStage::Area => true,
     };
     let has_sides = plan.ideal.size_px.iter().all(|&side| side >= 2);
-    is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides
+    plan.preset != Preset::Paper && solves && has_map && has_rows && has_few_taps && has_sides
+}
+
+/// Whether the cpu makes frames of a plan from a copy of an ideal frame that an adapter has drawn: one, without
+/// samples for silhouette rays.
+#[must_use]
+pub fn cpu_takes_copies(plan: &FramePlan) -> bool {
+    cpu_vectorises(plan) && plan.keys.len() == 1 && !plan.edges.has_rays() && plan.zoom.is_none()
+}
+
+/// Whether the cpu's rasteriser draws the ideal frames of a plan, if it [draws the scene](cpu_rasterises): in
+/// linear light, with shadows at pixels alone, and with samples within its coordinates.
+#[must_use]
+pub fn cpu_draws(plan: &FramePlan) -> bool {
+    let (has_samples, scale) = (plan.edges != EdgeStage::None, scale_of(plan.edges));
+    let is_within = plan.ideal.size_px.iter().all(|&side| 2 * scale * side <= MOST_RASTER_SIDE);
+    plan.preset != Preset::Paper && (plan.shadows.is_none() || scale == 1) && (is_within || !has_samples)
 }
 
 /// Whether the cpu's rasteriser draws a scene: pictures that one texture holds, none of them mirrored beyond

@@ -21,7 +21,8 @@ use camsim_plan::uniforms::Truth;
 
 use crate::{
     fixtures,
-    general::{FineSamples, FrameInputs, IdealImage, ReversePass, RowTable, render},
+    general::{FrameInputs, IdealImage, ReversePass, RowTable, images, render},
+    silhouettes::FineSamples,
 };
 
 pub use crate::fixtures::{barrel_lens, ground_and_roof, pattern as ground, rolling};
@@ -117,13 +118,14 @@ impl Case {
                         })
                     })
                     .collect();
-                let depths = fine_pixels.iter().map(|samples| samples.map(|(w, _)| w as f32)).collect();
+                let depth = |samples: &[(f64, DVec3); 4]| samples.map(|(w, _)| w as f32);
+                let depths: Vec<[f32; 4]> = fine_pixels.iter().map(depth).collect();
                 let color = |(_, color): (f64, DVec3)| color.to_array().map(f16::from_f64);
                 let colors = match scale {
                     1 => Vec::new(),
                     _ => fine_pixels.iter().map(|samples| samples.map(color)).collect(),
                 };
-                Some(FineSamples::new(size_px, &inverse_depth, (scale, thin), depths, colors))
+                Some(FineSamples::of_quads(size_px, &inverse_depth, (scale, thin), &depths, colors))
             }
         };
         IdealImage {
@@ -153,7 +155,9 @@ impl Case {
     }
 
     pub fn with_pass<T>(&self, ideal: &[IdealImage], run: impl FnOnce(&ReversePass<'_>) -> T) -> T {
-        self.with_inputs(0.0, |inputs| run(&ReversePass::new(&self.plan, &self.sequence, ideal, inputs)))
+        self.with_inputs(0.0, |inputs| {
+            run(&ReversePass::new(&self.plan, &self.sequence, images(ideal), inputs))
+        })
     }
 
     fn with_inputs<T>(&self, coords_phase: f64, run: impl FnOnce(&FrameInputs<'_>) -> T) -> T {

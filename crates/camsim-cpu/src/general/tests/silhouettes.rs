@@ -1,17 +1,26 @@
 //! Pixels that see several surfaces against the reference.
 
+use std::sync::Arc;
+
 use camsim_core::{
     reference::{self, coord_errors, disocclusion},
     scenario::{Auto, Channel, FieldOr, Readout, Scenario, ShutterSpec, Silhouettes, Solver},
+    scene::SceneBatches,
     temporal::{silhouette_rays::first_surface_of_keys, supersampled::PixelCentre},
 };
-use camsim_plan::{EdgeStage, TemporalStage};
+use camsim_plan::{
+    EdgeStage, TemporalStage,
+    placement::{cpu_draws, cpu_vectorises},
+    uniforms::{Truth, frame_uniforms},
+};
 use glam::{DVec2, DVec3};
 
 use super::scenes::{
-    Case, EAST, HEADING_RAD, TURN, ground_and_roof, rms_dn, rolling, scenario, sequence, steady, wall,
+    Case, EAST, HEADING_RAD, TURN, barrel_lens, ground_and_roof, rms_dn, rolling, scenario, sequence, steady,
+    wall,
 };
 use crate::{
+    CpuRenderer, ReverseInputs, RowTable,
     fixtures::supersampled::{SilhouetteErrors, SupersampledFrame, with_keys_of_pixel},
     general::{IdealImage, Pixel, ReversePass, rays::Ray},
 };
@@ -118,6 +127,50 @@ fn rays_through_key_frames_agree_with_their_twin() {
         assert!(other_key * 50 < compared && (keys == 1 || later_keys > 100), "{other_key} {later_keys}");
         // A pixel whose rays meet one surface is gathered plainly.
         assert!(compared > 200 && mean < 2e-3 && differing * 50 < compared, "{mean} {differing} {compared}");
+    }
+}
+
+/// The picture and truth of a renderer whose general code draws or makes the frame, or all of it is vectorised.
+fn rendered(case: &Case, [casts, is_general]: [bool; 2]) -> (Vec<f32>, Vec<Truth>) {
+    let (plan, sequence) = (&case.plan, &case.sequence);
+    let mut renderer = CpuRenderer::new(sequence.clone(), Arc::new(SceneBatches::new(&sequence.scene)));
+    let tolerance = plan.model_tolerance(&sequence.scenario.quality);
+    renderer.set_general_only(casts);
+    let buffer = renderer.draw_ideal(plan, &[], &tolerance);
+    renderer.set_general_only(is_general);
+    let uniforms = frame_uniforms(plan, sequence, 0.0);
+    let rows = RowTable::new(plan, &sequence.path);
+    let (picture, truth) =
+        renderer.reverse(&ReverseInputs { plan, uniforms: &uniforms, rows: &rows }, buffer);
+    (picture, truth.unwrap_or_default())
+}
+
+#[test]
+fn vectorised_frames_with_rays_agree_with_general_ones() {
+    for (keys, exposure_ms, scale) in [(1, 100.0, 1), (2, 60.0, 1), (3, 0.0, 2)] {
+        let mut scenario = by_rays(if keys == 1 { 60.0 } else { 900.0 }, exposure_ms, keys);
+        scenario.camera.lens = barrel_lens();
+        scenario.camera.photometric.noise_sigma = 0.01;
+        let scene = ground_and_roof(900.0, 60.0, 15.0);
+        let mut case = Case::new(sequence(scenario, steady(120.0, EAST, 0.2 * TURN), scene));
+        case.plan.edges = EdgeStage::Supersampled { scale, samples: 32, thin: true };
+        assert!(cpu_vectorises(&case.plan) && cpu_draws(&case.plan) && case.plan.keys.len() == keys as usize);
+        let general = rendered(&case, [true, true]);
+        for casts in [true, false] {
+            let (picture, truth) = rendered(&case, [casts, false]);
+            let dn = rms_dn(&picture, &general.0, |_| true);
+            let unknown = |truth: &[Truth]| truth.iter().filter(|truth| truth.depth_m < 0.0).count();
+            let [own, other] = [unknown(&truth), unknown(&general.1)];
+            let source_px =
+                std::iter::zip(&truth, &general.1).filter(|(a, b)| a.depth_m > 0.0 && b.depth_m > 0.0);
+            let most_px = source_px.fold(0.0_f32, |most, (a, b)| {
+                most.max((a.source_px[0] - b.source_px[0]).hypot(a.source_px[1] - b.source_px[1]))
+            });
+            eprintln!("{keys} keys, cast {casts}: {dn:.3} DN, {own} and {other} for rays, {most_px:.1e} px");
+            // Rays of a rasterised frame meet borders that are a subpixel step away.
+            assert!(dn < if casts { 0.1 } else { 0.6 } && most_px < 0.01, "{dn} {most_px}");
+            assert!(other > 20 && own.abs_diff(other) * 20 < other, "{own} {other}");
+        }
     }
 }
 
