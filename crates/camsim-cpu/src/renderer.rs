@@ -17,9 +17,10 @@ use camsim_plan::{
 
 use crate::{
     cast::CastScene,
-    general::{self, FrameInputs, IdealImage, Repaint, RowTable},
+    general::{self, FrameInputs, Repaint, RowTable},
     ideal::{DrawInputs, RasterFrame, RasterScene},
     reverse::{EdgeTiles, IdealTexels, Kernel, KernelFrame, KernelInputs, LensMap},
+    silhouettes::IdealImage,
 };
 
 /// Number of buffers for ideal frames of a camera without faces: one for the current frame, one for the next. A

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use edge_line::{EdgeLine, Members, edge_line};
 use edge_mask::EdgeMask;
-pub(crate) use image::{Colors, KeyImage, SilhouetteImage};
+pub(crate) use image::{Colors, IdealImage, KeyImage, SilhouetteImage};
 pub(crate) use march::{RayPath, StraightRay, SurfaceHit};
 
 /// Depths in memory: of pixels, or a pixel a sample.

@@ -54,16 +54,9 @@ pub struct Planner {
     /// The last groups of frames that were planned.
     groups: RecentCache<FrameGroup>,
     /// The last frames that were planned by themselves: callers may need them twice, and groups their middle.
-    last: RecentCache<PlannedAlone>,
+    last: RecentCache<(FramePlan, PictureChoice)>,
     /// The planners of the faces that a wide field is divided among.
     faces: Vec<Self>,
-}
-
-/// A frame that was planned by itself.
-#[derive(Debug)]
-struct PlannedAlone {
-    plan: FramePlan,
-    picture: PictureChoice,
 }
 
 /// The plan of a frame, step by step.
@@ -231,17 +224,16 @@ impl Planner {
 
     /// The plan of a frame by itself.
     fn plan_alone(&self, frame: u64) -> Result<FramePlan, PlanError> {
-        self.planned_alone(frame).map(|planned| planned.plan.clone())
+        self.planned_alone(frame).map(|planned| planned.0.clone())
     }
 
-    fn planned_alone(&self, frame: u64) -> Result<Arc<PlannedAlone>, PlanError> {
+    fn planned_alone(&self, frame: u64) -> Result<Arc<(FramePlan, PictureChoice)>, PlanError> {
         let find = || {
             let context = FrameContext::new(&self.inputs, frame, None)?;
             let scene = context.scene();
             let picture =
                 self.picture_alike(&context, &scene).unwrap_or_else(|| picture::choose(&context, &scene));
-            let plan = plan_of(&context, &scene, &picture)?;
-            Ok(PlannedAlone { plan, picture })
+            Ok((plan_of(&context, &scene, &picture)?, picture))
         };
         self.last.try_get(frame, find)
     }
@@ -250,7 +242,7 @@ impl Planner {
     /// as well.
     fn picture_alike(&self, context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Option<PictureChoice> {
         let middle = context.middle_of_company().filter(|middle| *middle != context.frame)?;
-        picture::choose_alike(context, scene, &self.planned_alone(middle).ok()?.picture)
+        picture::choose_alike(context, scene, &self.planned_alone(middle).ok()?.1)
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.

@@ -1,5 +1,6 @@
 //! What the camera sees: rays, probes, surfaces, motion, exposure, and the neighbourhoods of probes.
 
+pub(crate) mod beam;
 pub(crate) mod constant_twist;
 pub(crate) mod exposure;
 pub(crate) mod faces;

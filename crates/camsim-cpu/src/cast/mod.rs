@@ -17,7 +17,7 @@ use glam::{DVec2, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
-use crate::{general::IdealImage, silhouettes::FineSamples};
+use crate::silhouettes::{FineSamples, IdealImage};
 
 mod mips;
 mod moving;

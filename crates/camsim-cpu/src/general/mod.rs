@@ -11,7 +11,7 @@ use camsim_core::{
     scenario::Preset,
     scene::linear_from_srgb,
     sequence::Sequence,
-    temporal::{Footprint, IdealGeometry, paper::linear_fog, silhouette_rays::nearest_first},
+    temporal::{Footprint, paper::linear_fog, silhouette_rays::nearest_first},
 };
 use camsim_plan::{FramePlan, RayStage, uniforms::Truth};
 use glam::{DVec2, DVec3};
@@ -36,24 +36,11 @@ use solver::Solver;
 use crate::{
     ideal::{RasterFrame, Silhouettes},
     reverse::{EdgeTiles, KernelFrame, Listed},
-    silhouettes::{Colors, FineSamples, KeyImage},
+    silhouettes::{Colors, IdealImage, KeyImage},
     simd::lanes::LANES,
 };
 
 pub use rows::RowTable;
-
-/// An ideal frame.
-#[derive(Clone, Debug)]
-pub struct IdealImage {
-    /// Size, focal length and principal point.
-    pub geometry: IdealGeometry,
-    /// Row-major R G B A: linear light, or encoded sRGB values for the paper preset. A is ignored.
-    pub color_rgba: Vec<f32>,
-    /// Inverse planar depth, 1/m, 0 = sky.
-    pub inverse_depth: Vec<f32>,
-    /// Samples for silhouette rays; `None` if the plan has no [`camsim_plan::EdgeStage::Supersampled`].
-    pub fine: Option<FineSamples>,
-}
 
 /// Inputs of a frame besides its plan and its ideal frames.
 #[derive(Clone, Copy, Debug)]

@@ -6,10 +6,9 @@ use rayon::prelude::*;
 
 use super::{CHANNELS, rasterise::ROW_PADDING};
 use crate::{
-    general::IdealImage,
     large_pages::LargeArray,
     reverse::IdealTexels,
-    silhouettes::{DepthPlane, FineSamples},
+    silhouettes::{DepthPlane, FineSamples, IdealImage},
     simd::lanes::LANES,
 };
 

@@ -23,6 +23,19 @@ pub(crate) enum Colors<'a> {
     Halves(&'a [u16], usize),
 }
 
+/// An ideal frame.
+#[derive(Clone, Debug)]
+pub(crate) struct IdealImage {
+    /// Size, focal length and principal point.
+    pub geometry: IdealGeometry,
+    /// Row-major R G B A: linear light, or encoded sRGB values for the paper preset. A is ignored.
+    pub color_rgba: Vec<f32>,
+    /// Inverse planar depth, 1/m, 0 = sky.
+    pub inverse_depth: Vec<f32>,
+    /// Samples for silhouette rays; `None` if the plan has no [`camsim_plan::EdgeStage::Supersampled`].
+    pub fine: Option<FineSamples>,
+}
+
 /// An ideal frame in memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KeyImage<'a> {

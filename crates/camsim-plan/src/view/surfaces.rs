@@ -3,7 +3,6 @@
 //! What moves is met where it is at the instant of the ray ([`Surfaces::first_hit_at`]). Rays without an instant,
 //! and all bounds, have it where it is at path time 0.
 
-mod beam;
 mod moving;
 #[cfg(test)]
 mod tests;
@@ -20,7 +19,6 @@ use camsim_core::{
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::ir::limits::NEAR_M;
-pub(crate) use beam::Beam;
 use moving::{MovingMeshes, moving_meshes};
 
 /// The surfaces of a scene, prepared for rays.
@@ -30,7 +28,7 @@ pub(crate) struct Surfaces {
     /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them,
     /// and of those that are blended with it. A ray passes through thousands of panes to what is behind them.
     tree: ProximityBvh,
-    deep: RayBvh,
+    pub deep: RayBvh,
     pub solid: RayBvh,
     pub mixed: RayBvh,
     /// Meshes that move; these trees hold them at path time 0.
@@ -65,7 +63,7 @@ pub(crate) struct SurfaceHit {
 }
 
 impl SurfaceHit {
-    fn of_terrain(hit: TerrainHit) -> Self {
+    pub fn of_terrain(hit: TerrainHit) -> Self {
         Self {
             depth_m: hit.t,
             surface: 0,

@@ -8,10 +8,7 @@ use glam::DVec2;
 
 use super::search::{LINES, NeighbourhoodSearch};
 use crate::ir::margins;
-use crate::view::{
-    probes::Probe,
-    surfaces::{Beam, SurfaceHit},
-};
+use crate::view::{beam::Beam, probes::Probe, surfaces::SurfaceHit};
 
 /// Two of the points.
 pub(crate) type Pair = [usize; 2];

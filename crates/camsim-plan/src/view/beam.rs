@@ -10,7 +10,7 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use super::{SurfaceHit, Surfaces};
+use super::surfaces::{SurfaceHit, Surfaces};
 
 /// Part of its width by which the pyramid is wider than its rays: far more than rounding.
 const WIDER: f64 = 0.01;
