@@ -102,9 +102,8 @@ impl CpuRenderer {
     }
 
     /// Has the vectorised pass leave exact truth to rays: depths below 0.
-    #[must_use]
-    pub fn leaving_truth(self) -> Self {
-        Self { leaves_truth: true, ..self }
+    pub fn set_leaves_truth(&mut self, leaves_truth: bool) {
+        self.leaves_truth = leaves_truth;
     }
 
     /// Switches to another sequence over the same scene.

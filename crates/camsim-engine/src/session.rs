@@ -43,6 +43,7 @@ pub struct Session<'a> {
     cpu: CpuRenderer,
     gpu: Option<Box<dyn AdapterSession + 'a>>,
     coords_phase: f32,
+    looks_up_coords: bool,
     channels: Vec<Channel>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
@@ -97,14 +98,17 @@ impl<'a> Session<'a> {
         let optics = Optics::new(camera, *seed);
         let sensor = ImageSensor::new(camera, *seed);
         let late = DeferredPhotometric::new(&still);
+        let mut cpu = CpuRenderer::new(still, meshes);
+        cpu.set_leaves_truth(true);
         Ok(Self {
             engine,
             lanes: lanes(&planner, scene_planner.as_deref(), moving, &[]),
-            cpu: CpuRenderer::new(still, meshes).leaving_truth(),
+            cpu,
             planner,
             scene_planner,
             gpu,
             coords_phase: 0.0,
+            looks_up_coords: false,
             channels: channels.into(),
             hits: Vec::new(),
             optics,
@@ -168,6 +172,12 @@ impl<'a> Session<'a> {
     /// mid-exposure), to check the exposure path.
     pub fn set_coords_phase(&mut self, phase: f32) {
         self.coords_phase = phase;
+    }
+
+    /// Gives the coordinates that the picture is made by, not those of exact rays: to measure the temporal inverse.
+    pub fn set_looked_up_coords(&mut self, looked_up: bool) {
+        self.looks_up_coords = looked_up;
+        self.cpu.set_leaves_truth(!looked_up);
     }
 
     /// Has the cpu use its general code for every pass that it makes ([`CpuRenderer::set_general_only`]): for
@@ -402,7 +412,13 @@ impl<'a> Session<'a> {
         }
         let mut planes = Vec::new();
         if let Some(truth) = &mut truth {
+            let is_looked_up = |truth: &Truth| self.looks_up_coords && truth.depth_m >= 0.0;
+            let looked_up: Vec<Option<[f32; 2]>> =
+                truth.iter().map(|truth| is_looked_up(truth).then_some(truth.source_px)).collect();
             let by_rays = self.complete_truth(lane, plan, &color_rgba, truth)?;
+            for (truth, source_px) in truth.iter_mut().zip(looked_up) {
+                truth.source_px = source_px.unwrap_or(truth.source_px);
+            }
             planes.push(Plane::depth(truth.iter().map(|t| t.depth_m).collect()));
             planes.push(Plane::coords(finished::coords(truth, &color_rgba, plan, &sequence.path)));
             planes.extend(by_rays);

@@ -172,6 +172,7 @@ struct Found {
 fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
     let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords]).expect("session");
+    session.set_looked_up_coords(true);
     let begin = Instant::now();
     let plan = session.planner().plan(0).expect("a plan");
     let plan_ms = 1e3 * begin.elapsed().as_secs_f64();

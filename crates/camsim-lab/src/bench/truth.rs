@@ -85,6 +85,7 @@ impl Truth {
         sequence: &Arc<Sequence>,
     ) -> Result<Option<CoordErrors>, BenchError> {
         let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords])?;
+        session.set_looked_up_coords(true);
         let mut finished = None;
         session.render::<Infallible>([FRAME], &mut |done| {
             finished = Some(done);
