@@ -134,7 +134,8 @@ fn sky_coordinates_are_exact_beside_surfaces() {
         let sequence = flying_past(exposure_ms, 60.0);
         let mut engine = engine();
         engine.set_backend(backend);
-        let done = common::render(&engine, &sequence, &[Channel::Color, Channel::Coords, Channel::Depth], 0);
+        let done =
+            common::render_exact(&engine, &sequence, &[Channel::Color, Channel::Coords, Channel::Depth], 0);
         let options = RenderOptions {
             channels: vec![Channel::Coords, Channel::Depth],
             max_samples: 1,

@@ -14,7 +14,7 @@ use camsim_core::{
     sequence::Sequence,
 };
 use camsim_engine::Engine;
-use common::{pattern, render, scenario, sequence, steady};
+use common::{pattern, render_exact, scenario, sequence, steady};
 use glam::DVec3;
 
 const SIZE_PX: [u32; 2] = [96, 72];
@@ -74,7 +74,7 @@ fn twin(sequence: &Sequence, twin: &TwinSpec, instant: Option<u32>, channels: &[
 }
 
 fn frame(sequence: &Sequence, channels: &[Channel]) -> RenderedFrame {
-    render(&Engine::cpu(), &Arc::new(sequence.clone()), channels, FRAME).frame
+    render_exact(&Engine::cpu(), &Arc::new(sequence.clone()), channels, FRAME).frame
 }
 
 #[test]

@@ -9,7 +9,7 @@ pub mod rays;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{scenario::Channel, sequence::Sequence};
-use camsim_engine::{AdapterChoice, Engine, Finished, IdealPlanes};
+use camsim_engine::{AdapterChoice, Engine, Finished, IdealPlanes, Session};
 
 pub use fixtures::*;
 
@@ -25,7 +25,7 @@ pub fn is_software(engine: &Engine) -> bool {
     engine.gpu().expect("an adapter").adapter.kind == "software"
 }
 
-/// Renders one frame with the given coordinates phase.
+/// Renders one frame with the given coordinates phase. Coordinates are those that the picture is made by.
 pub fn render_at_phase(
     engine: &Engine,
     sequence: &Arc<Sequence>,
@@ -35,6 +35,16 @@ pub fn render_at_phase(
 ) -> Finished {
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     session.set_coords_phase(phase);
+    session.set_looked_up_coords(true);
+    render_one(session, frame)
+}
+
+/// Renders one frame. Coordinates are those of exact rays.
+pub fn render_exact(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64) -> Finished {
+    render_one(engine.session::<Infallible>(sequence.clone(), channels).expect("session"), frame)
+}
+
+fn render_one(mut session: Session<'_>, frame: u64) -> Finished {
     let mut found = None;
     session
         .render::<Infallible>([frame], &mut |finished| {
