@@ -43,7 +43,8 @@ impl<'e> Measuring<'e> {
         with_pictures: bool,
     ) -> Result<Self, VerifyError> {
         let oracle = Oracle::new(sequence.clone())?;
-        let session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
+        let mut session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
+        session.set_looked_up_coords(true);
         Ok(Self { session, oracle, with_pictures })
     }
 
