@@ -241,7 +241,7 @@ impl Planner {
     /// The picture of a frame sampled as the middle one of those that see nearly the same is, if that does for it
     /// as well.
     fn picture_alike(&self, context: &FrameContext<'_>, scene: &FrameScene<'_>) -> Option<PictureChoice> {
-        let middle = context.middle_of_company().filter(|middle| *middle != context.frame)?;
+        let middle = context.middle_of_span().filter(|middle| *middle != context.frame)?;
         picture::choose_alike(context, scene, &self.planned_alone(middle).ok()?.1)
     }
 

@@ -61,7 +61,7 @@ pub(crate) struct FrameContext<'a> {
     /// The ideal frame that others are made from too, if this one is to be.
     pub shared: Option<&'a SharedIdeal>,
     /// Frames that have a quarter of the probes each, and share what they find; none if this one has all.
-    company: Range<u64>,
+    span: Range<u64>,
     /// Request for its sampling plan.
     pub request: SamplingRequest,
     /// Key instant.
@@ -102,12 +102,12 @@ impl<'a> FrameContext<'a> {
     ) -> Result<Self, PlanError> {
         let stamp_s = inputs.stamp_s(frame);
         let zoom = inputs.zoom.as_ref().map(|_| zoom_at(&inputs.sequence.zoom_track, stamp_s));
-        let company = match shared {
-            _ if inputs.has_company(frame) => inputs.span_of(frame),
+        let span = match shared {
+            _ if inputs.shares_probes(frame) => inputs.span_of(frame),
             Some(shared) => shared.frames.clone(),
             None => 0..0,
         };
-        let quarter = if company.is_empty() { None } else { inputs.quarter_of_the_probes(frame) };
+        let quarter = if span.is_empty() { None } else { inputs.quarter_of_the_probes(frame) };
         let reach = match (&quarter.or_else(|| inputs.fixed.clone()), &inputs.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
             (None, Some(table), Some(value)) => Arc::new(inputs.zoomed(table, value)?),
@@ -133,7 +133,7 @@ impl<'a> FrameContext<'a> {
             dry_run_reach: inputs.fixed.clone().filter(|_| shared.is_none()).unwrap_or_else(|| reach.clone()),
             reach,
             shared,
-            company,
+            span,
             request: SamplingRequest::default(),
             key_s,
             key_pose,
@@ -148,8 +148,8 @@ impl<'a> FrameContext<'a> {
     }
 
     /// The frame in the middle of those that see nearly the same, by which all are sampled; `None` without.
-    pub fn middle_of_company(&self) -> Option<u64> {
-        let Range { start, end } = self.company;
+    pub fn middle_of_span(&self) -> Option<u64> {
+        let Range { start, end } = self.span;
         (start < end).then_some((start + end) / 2)
     }
 
@@ -277,7 +277,7 @@ impl<'a> FrameContext<'a> {
         let model = |all: &Neighbourhoods| {
             SilhouetteModel::new(all, &reach.camera, key_pose, &plane, disocclusion, least_fraction)
         };
-        Some(if self.company.is_empty() {
+        Some(if self.span.is_empty() {
             model(&own)
         } else {
             model(&own.with(self.neighbourhoods_of_others()))
@@ -296,7 +296,7 @@ impl<'a> FrameContext<'a> {
             stamp_s: self.inputs.stamp_s(frame),
             gain,
         };
-        let cache = if self.company.is_empty() { neighbourhoods } else { neighbourhoods_of_quarters };
+        let cache = if self.span.is_empty() { neighbourhoods } else { neighbourhoods_of_quarters };
         cache.get(frame, || search.neighbourhoods())
     }
 
@@ -305,7 +305,7 @@ impl<'a> FrameContext<'a> {
     fn neighbourhoods_of_others(&self) -> impl Iterator<Item = Neighbourhoods> {
         let own_pose =
             |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.inputs.shutter.dt_pixel_s(x, y));
-        self.company.clone().filter(|&other| other != self.frame).filter_map(move |other| {
+        self.span.clone().filter(|&other| other != self.frame).filter_map(move |other| {
             let reach = self.inputs.quarter_of_the_probes(other)?;
             Some(self.neighbourhoods(other, &reach).seen_from(&reach.probes, own_pose))
         })

@@ -33,7 +33,7 @@ const MOST_GROUPS_AT_ONCE: usize = 8;
 
 /// Frames that share what their probes find, at most and at least: spans begin at multiples.
 const FRAMES_OF_A_SPAN: u64 = 8;
-const LEAST_COMPANY: u64 = 4;
+const LEAST_FRAMES_OF_A_SPAN: u64 = 4;
 /// Least area of what the first and the last frame of a span show together, in times of one of them, from which
 /// on they do not see the same.
 const ALIKE: f64 = 2.0;
@@ -178,9 +178,9 @@ impl PlanInputs {
     }
 
     /// Whether the frames around a frame see nearly the same, so that a quarter of the probes does for each.
-    pub fn has_company(&self, frame: u64) -> bool {
+    pub fn shares_probes(&self, frame: u64) -> bool {
         let span = self.span_of(frame);
-        let is_long = span.contains(&frame) && span.end - span.start >= LEAST_COMPANY;
+        let is_long = span.contains(&frame) && span.end - span.start >= LEAST_FRAMES_OF_A_SPAN;
         is_long && *self.spans.get(span.start, || self.see_alike(span.clone()).unwrap_or(false))
     }
 
