@@ -40,7 +40,7 @@ pub(crate) fn passes(plan: &FramePlan) -> Vec<String> {
     passes.push("readback".to_owned());
     passes.extend(plan.finishing.iter().map(ToString::to_string));
     if plan.has_exact_truth() {
-        passes.push("cpu: rays in f64 for depth and coordinates at edges and creases".to_owned());
+        passes.push("cpu: a ray in f64 a pixel for depth and coordinates".to_owned());
     }
     passes
 }
