@@ -24,7 +24,7 @@ fn is_same(packet: &PixelTruth, alone: &PixelTruth) -> bool {
         (Some(a), Some(b)) => {
             // A ray on an edge hits both of its triangles.
             let is_same_triangle = (a.surface, a.triangle) == (b.surface, b.triangle);
-            (is_same_triangle || a.surface == b.surface)
+            a.surface == b.surface
                 && (a.depth_m - b.depth_m).abs() <= ROUNDING * b.depth_m
                 && (!is_same_triangle || a.normal_ned.distance(b.normal_ned) < ROUNDING)
         }

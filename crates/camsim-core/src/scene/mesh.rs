@@ -342,14 +342,14 @@ impl Mesh {
         triangles.meet_packet(packet, (self.ned_from_shape, self.origin_ned_m), &mut |triangle, packet| {
             crate::simd::with_widest(
                 #[inline(always)]
-                || self.meet_triangle(packet, triangle as usize, of),
+                || self.meet_triangle(packet, triangle, of),
             );
         });
     }
 
     #[inline(always)]
-    fn meet_triangle(&self, packet: &mut RayPacket, triangle: usize, of: PacketSurface) {
-        let corners = [0, 1, 2].map(|k| self.shape.indices[3 * triangle + k]);
+    fn meet_triangle(&self, packet: &mut RayPacket, triangle: u32, of: PacketSurface) {
+        let corners = self.shape.triangle(triangle);
         let points = corners.map(|corner| self.position_ned_m(corner));
         let (packet_from_ned, origin_ned_m) = packet.axes();
         packet.meet(points.map(|point| packet_from_ned * (point - origin_ned_m)), of, |ray, limit| {
