@@ -11,12 +11,13 @@ use super::{IdealGeometry, MAX_KEYS, supersampled::SupersampledImage};
 /// sequence).
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Step of the march along the epipolar line of a ray, ideal pixels, up to [`MAX_STEPS`] steps.
-const STEP_PX: f64 = 0.5;
-const MAX_STEPS: f64 = 128.0;
+pub const STEP_PX: f64 = 0.5;
+/// Most steps of the march.
+pub const MAX_STEPS: f64 = 128.0;
 /// Bisections of the step in which a ray stops being in front of the surface.
-const HALVINGS: u32 = 5;
+pub const HALVINGS: u32 = 5;
 /// Depth steps whose parallax is below this, in ideal pixels, occlude nothing.
-const GAP_PX: f64 = 0.1;
+pub const GAP_PX: f64 = 0.1;
 
 /// Subsample `i` of `count` (a power of two): position in the pixel, -0.5 to 0.5 (Hammersley points), and
 /// fraction of the exposure that has passed.

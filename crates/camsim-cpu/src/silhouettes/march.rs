@@ -1,15 +1,13 @@
 //! The march of a ray along its epipolar line in an ideal frame: twin of
 //! [`camsim_core::temporal::silhouette_rays::march`].
 
+use camsim_core::temporal::silhouette_rays::{self, HALVINGS};
+
 use super::SilhouetteImage;
 
-/// Step of the march, ideal pixels, up to [`MAX_STEPS`] steps.
-const STEP_PX: f32 = 0.5;
-const MAX_STEPS: f32 = 128.0;
-/// Bisections of the step in which a ray stops being in front of the surface.
-const HALVINGS: u32 = 5;
-/// Depth steps whose parallax is below this, in ideal pixels, occlude nothing.
-const GAP_PX: f32 = 0.1;
+const STEP_PX: f32 = silhouette_rays::STEP_PX as f32;
+const MAX_STEPS: f32 = silhouette_rays::MAX_STEPS as f32;
+const GAP_PX: f32 = silhouette_rays::GAP_PX as f32;
 /// The march starts at this multiple of the inverse depth of the nearest surface.
 const NEARER: f32 = 1.02;
 /// Largest ratio of that surface's inverse depth in the row's camera to that in the key camera. Without a

@@ -167,8 +167,9 @@ fn vectorised_frames_with_rays_agree_with_general_ones() {
                 most.max((a.source_px[0] - b.source_px[0]).hypot(a.source_px[1] - b.source_px[1]))
             });
             eprintln!("{keys} keys, cast {casts}: {dn:.3} DN, {own} and {other} for rays, {most_px:.1e} px");
-            // Rays of a rasterised frame meet borders that are a subpixel step away.
-            assert!(dn < if casts { 0.1 } else { 0.6 } && most_px < 0.01, "{dn} {most_px}");
+            // Measured: 0.013 DN and 1.8e-5 px. In rasterised frames corners are rounded to a part of a pixel, which
+            // moves borders: 0.017 to 0.157 DN, 3.1e-5 px.
+            assert!(dn < if casts { 0.03 } else { 0.3 } && most_px < 1e-3, "{dn} {most_px}");
             assert!(other > 20 && own.abs_diff(other) * 20 < other, "{own} {other}");
         }
     }
