@@ -11,7 +11,7 @@ use camsim_core::{
     sequence::Sequence,
 };
 use camsim_engine::Session;
-use common::{city, engine, pattern, render, scenario, sequence, steady};
+use common::{city, engine, pattern, render_exact, scenario, sequence, steady};
 use glam::DVec3;
 
 const COLOR: [Channel; 1] = [Channel::Color];
@@ -91,7 +91,7 @@ fn renewed_session_gives_the_frames_of_a_new_session() {
         session.renew::<Infallible>(changed.clone(), channels).expect(what);
         for frame in [3, 9] {
             let renewed = next(&mut session, frame);
-            let fresh = render(&engine, &changed, channels, frame).frame;
+            let fresh = render_exact(&engine, &changed, channels, frame).frame;
             assert_eq!(renewed.color_rgba(), fresh.color_rgba(), "{what}: colour of frame {frame}");
             assert_eq!(renewed.depth_m(), fresh.depth_m(), "{what}: depth of frame {frame}");
             assert_eq!(renewed.coords(), fresh.coords(), "{what}: coordinates of frame {frame}");
@@ -123,5 +123,5 @@ fn refused_sequence_leaves_the_session_unchanged() {
         ["camera.size_px is", "32768"]
     };
     assert!(expected.iter().all(|text| refused.contains(text)), "{refused}");
-    assert_eq!(next(&mut session, 3).color_rgba(), render(&engine, &good, &COLOR, 3).frame.color_rgba());
+    assert_eq!(next(&mut session, 3).color_rgba(), render_exact(&engine, &good, &COLOR, 3).frame.color_rgba());
 }
