@@ -25,6 +25,7 @@ mod gather;
 mod ideal_texels;
 mod photometric;
 mod rays;
+mod sideways;
 mod silhouettes;
 mod source;
 mod truth;
@@ -125,6 +126,14 @@ impl Kernel {
     /// Without an ideal frame for each of the plan's.
     #[must_use]
     pub fn render(&self, plan: &FramePlan, inputs: &KernelInputs<'_>) -> KernelFrame {
+        match sideways::is_sideways(inputs.frame) {
+            true => sideways::turned(inputs, |inputs| self.render_lines(plan, inputs)),
+            false => self.render_lines(plan, inputs),
+        }
+    }
+
+    /// Renders a picture whose lines are rows, or one that is transposed.
+    fn render_lines(&self, plan: &FramePlan, inputs: &KernelInputs<'_>) -> KernelFrame {
         let has_truth = plan.truth;
         let KernelInputs { frame, poses, map, vignette, ideals, edges, leaves_truth } = *inputs;
         let looks_up = has_truth && !(leaves_truth && plan.has_exact_truth());
@@ -146,7 +155,7 @@ impl Kernel {
             vignette,
             poses,
             reference_poses: poses.get(references).filter(|_| has_reference_poses(plan)).unwrap_or_default(),
-            copied_from: plan.copied_from(),
+            copied_from: plan.copied_from().filter(|_| !sideways::is_sideways(frame)),
             segments: &self.segments,
             grid_taps: &self.grid_taps,
         };

@@ -6,10 +6,11 @@ use camsim_core::{
     scene::LUMINANCE,
 };
 
+use super::sideways::is_sideways;
 use crate::simd::lanes::{LANES, Lanes, ZERO, clamp_to, per_lane};
 use camsim_plan::uniforms::FrameUniforms;
 
-/// Photometric stage of pixels of a row, from `x` on.
+/// Photometric stage of pixels of a line, from `x` on.
 #[inline(always)]
 pub(super) fn photometric(
     frame: &FrameUniforms,
@@ -38,12 +39,13 @@ pub(super) fn photometric(
     values
 }
 
-/// Independent standard normals for pixels of a row from `x` on, for the first `channels` of three channels.
+/// Independent standard normals for pixels of a line from `x` on, for the first `channels` of three channels.
 #[inline(always)]
 fn normals(frame: &FrameUniforms, segments: &[[f32; 2]], x: u32, y: u32, channels: usize) -> [Lanes; 3] {
     let mut bits = [[0_u32; LANES]; 3];
+    let (first, step) = if is_sideways(frame) { (y | (x << 16), 1 << 16) } else { (x | (y << 16), 1) };
     for i in 0..LANES {
-        let pixel = (x + i as u32) | (y << 16);
+        let pixel = first + step * i as u32;
         let words = pcg4d([
             pixel,
             frame.frame_number,

@@ -2,7 +2,7 @@
 
 use camsim_core::camera::{CameraModel, INVALID_UV};
 
-use super::footprint::scaled;
+use super::{footprint::scaled, sideways::is_sideways};
 use crate::large_pages::LargeArray;
 use crate::simd::lanes::{LANES, Lanes, Lanes2, ZERO, per_lane};
 use camsim_plan::uniforms::FrameUniforms;
@@ -40,7 +40,7 @@ pub(super) struct BlockRays {
     pub valid: Lanes,
 }
 
-/// Rays of a row from `x` on; lanes beyond the end have none.
+/// Rays of a line from its pixel `x` on; lanes beyond the end have none.
 #[inline(always)]
 pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32) -> BlockRays {
     let width = frame.size_px[0];
@@ -65,10 +65,10 @@ pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32)
             }
         }
         None => {
-            let ([cx, cy], [fx, fy]) = (frame.principal_px, frame.focal_px);
-            uv = Lanes2 {
-                x: per_lane(|i| ((x + i as u32) as f32 - cx) / fx),
-                y: per_lane(|_| (y as f32 - cy) / fy),
+            let at = |axis: usize, px: u32| (px as f32 - frame.principal_px[axis]) / frame.focal_px[axis];
+            uv = match is_sideways(frame) {
+                false => Lanes2 { x: per_lane(|i| at(0, x + i as u32)), y: [at(1, y); LANES] },
+                true => Lanes2 { x: [at(0, y); LANES], y: per_lane(|i| at(1, x + i as u32)) },
             };
             valid = per_lane(|i| if x + (i as u32) < width { 1.0 } else { 0.0 });
         }
@@ -92,7 +92,10 @@ pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMap>, x: u32, y: u32
             }
         }
     }
-    [scaled(&sides[0], frame.ideal_focal_px), scaled(&sides[1], frame.ideal_focal_px)]
+    if is_sideways(frame) {
+        sides.swap(0, 1);
+    }
+    sides.map(|side| scaled(&side, frame.ideal_focal_px))
 }
 
 /// Central differences of a whole block. Returns false if one of its pixels or of their neighbours has no ray

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use camsim_core::{
     photometric::GrayImage,
-    scenario::{Auto, Axis, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, VibrationSpec},
+    scenario::{
+        Auto, Axis, LensSpec, MountSpec, OutputEncoding, Readout, Scenario, ShutterSpec, Solver,
+        VibrationSpec,
+    },
     sequence::Sequence,
     temporal::{NodeDepths, PathStage, TapStage},
 };
@@ -149,14 +152,18 @@ pub fn photometric() -> Vec<Case> {
         let both = with_effects(Arc::unwrap_or_clone(sequence), output);
         cases.push(case(format!("{output:?}, rows at one instant"), both, 5));
     }
-    let mut scenario = small_scenario();
-    scenario.camera.shutter = rolling(30.0, 80.0);
-    let sequence = sequence(scenario, over_roof_at(TURN_OVER_ROOF), pattern(900.0));
-    cases.push(case(
-        "Srgb8, rolling shutter".into(),
-        with_effects(Arc::unwrap_or_clone(sequence), OutputEncoding::Srgb8),
-        0,
-    ));
+    for (readout, lens) in [
+        (Readout::TopToBottom, LensSpec::default()),
+        (Readout::LeftToRight, LensSpec::default()),
+        (Readout::RightToLeft, barrel_lens()),
+    ] {
+        let mut scenario = small_scenario();
+        scenario.camera.shutter = ShutterSpec { readout, ..rolling(30.0, 80.0) };
+        scenario.camera.lens = lens;
+        let sequence = sequence(scenario, over_roof_at(TURN_OVER_ROOF), pattern(900.0));
+        let both = with_effects(Arc::unwrap_or_clone(sequence), OutputEncoding::Srgb8);
+        cases.push(case(format!("Srgb8, rolling shutter, {readout:?}"), both, 0));
+    }
     cases
 }
 
