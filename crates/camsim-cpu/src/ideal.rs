@@ -13,7 +13,7 @@ use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::{
     pose::CameraPose,
-    scene::{Batch, Light, LodTolerance, PlacedMesh, Scene, SceneBatches, Texture, Wrap},
+    scene::{Batch, Light, LodTolerance, PlacedMesh, Scene, SceneBatches, Texture},
 };
 use camsim_plan::{EdgeStage, FramePlan, KeyFrame};
 use rayon::prelude::*;
@@ -25,6 +25,7 @@ use crate::simd::{
 };
 use camsim_plan::uniforms::{base_ned_m, ideal_camera};
 
+mod layers;
 mod meshes;
 mod multisample;
 mod prefilter;
@@ -43,8 +44,8 @@ use multisample::{Multisample, SAMPLES_PER_SIDE};
 pub(crate) use raster_frame::{RasterFrame, Silhouettes};
 use rasterise::{Band, PixelCentres, SKY, SamplePattern};
 use shade::{Material, PixelPlanes, Shader};
-use texture::SurfaceTexture;
-use triangles::{BAND_ROWS, Chunk, EXTRA_ATTRIBUTES, TriangleKind};
+use texture::{Reading, SurfaceTexture};
+use triangles::{BAND_ROWS, Chunk, ChunkKind, EXTRA_ATTRIBUTES, TriangleKind};
 use vertices::{Camera, Vertex};
 
 /// Terrain vertices per projection task.
@@ -122,18 +123,19 @@ impl RasterScene {
     pub fn new(scene: &Scene, batches: &SceneBatches) -> Self {
         let mut textures = TextureCache::default();
         let ground = match &scene.terrain {
-            Some(terrain) => SurfaceTexture::new(&terrain.texture, [Wrap::Clamp; 2], terrain.beyond),
+            Some(terrain) => SurfaceTexture::new(&terrain.texture, Reading::default(), terrain.beyond),
             None => SurfaceTexture::Uniform([0.0; 4]),
         };
         let mut materials = vec![Material {
             texture: Arc::new(ground),
-            tint: [1.0; 3],
+            tint: [1.0; 4],
             emissive: [0.0; 3],
+            blends: false,
+            cutoff: None,
             has_extra_attributes: false,
             sky: None,
         }];
-        materials
-            .extend(batches.batches.iter().map(|batch| material(batch, textures.triangles_of_piece(batch))));
+        materials.extend(batches.batches.iter().map(|batch| material(batch, textures.of_batch(batch))));
         let mesh_model = |batch: &Batch| MeshModel {
             levels: Vec::new(),
             one_sided: batch.material.one_sided,
@@ -165,7 +167,8 @@ impl RasterScene {
         self.make_pieces(view.batches, &level_instances);
         let mut parts = terrain_parts(view.terrain);
         self.add_parts(&level_instances, &mut parts);
-        let chunk_parts = chunk_parts(parts);
+        parts.sort_by_key(|(part, _)| self.kind_of(part));
+        let chunk_parts = self.chunk_parts(parts);
         let context = DrawContext { camera, pose: &key.pose, view, in_view: &in_view };
         match view.plan.samples_a_pixel {
             1 => self.draw_all(PixelCentres, &context, &chunk_parts, Some(1), into),
@@ -203,9 +206,14 @@ impl RasterScene {
         }
         self.visible.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
-        for pass in 0..chunk_parts.len().div_ceil(CHUNKS_PER_PASS).max(1) {
+        // Blended triangles are mixed in one pass, the last.
+        let is_blended = |parts: &Vec<DrawPart>| self.kind_of_all(parts) == ChunkKind::Blended;
+        let others = chunk_parts.partition_point(|parts| !is_blended(parts));
+        let passes = others.div_ceil(CHUNKS_PER_PASS).max(1);
+        for pass in 0..passes {
             let first = pass * CHUNKS_PER_PASS;
-            let chunk_parts = &chunk_parts[first..chunk_parts.len().min(first + CHUNKS_PER_PASS)];
+            let end = if pass + 1 == passes { chunk_parts.len() } else { first + CHUNKS_PER_PASS };
+            let chunk_parts = &chunk_parts[first..end];
             self.collect(context, chunk_parts, |_| {});
             self.fill(placements, context, chunk_parts.len(), shaded_px, pass > 0, into);
         }
@@ -221,9 +229,10 @@ impl RasterScene {
         let DrawContext { camera, view, .. } = context;
         into.fit_depth(view.plan.ideal.size_px);
         into.fit_color();
-        if chunk_parts.len() > CHUNKS_PER_PASS {
-            // The visible triangle of each sample would have to be kept between passes: instead each sample
-            // is drawn and shaded as a pixel.
+        let has_layers = chunk_parts.last().is_some_and(|parts| self.kind_of_all(parts) >= ChunkKind::Masked);
+        if has_layers || chunk_parts.len() > CHUNKS_PER_PASS {
+            // Samples show several triangles, or the visible one of each would have to be kept between passes:
+            // instead each sample is drawn and shaded as a pixel.
             let mut samples = RasterFrame::default();
             let per_pixel = Some(SAMPLES_PER_SIDE as u32);
             self.draw_all(rasterise::SamplePositions, context, chunk_parts, per_pixel, &mut samples);
@@ -272,6 +281,39 @@ impl RasterScene {
         }
     }
 
+    fn kind_of(&self, part: &DrawPart) -> ChunkKind {
+        let DrawPart::Piece { batch, .. } = part else { return ChunkKind::Terrain };
+        match &self.materials[batch + 1] {
+            Material { blends: true, .. } => ChunkKind::Blended,
+            Material { cutoff: Some(_), .. } => ChunkKind::Masked,
+            _ => ChunkKind::Opaque,
+        }
+    }
+
+    /// That of all parts of a chunk.
+    fn kind_of_all(&self, parts: &[DrawPart]) -> ChunkKind {
+        parts.first().map_or(ChunkKind::default(), |part| self.kind_of(part))
+    }
+
+    /// Distributes parts to chunks in order: at most [`TRIANGLES_PER_CHUNK`] triangles of one kind each, and few
+    /// chunks even for many different meshes.
+    fn chunk_parts(&self, parts: Vec<(DrawPart, usize)>) -> Vec<Vec<DrawPart>> {
+        let mut chunk_parts: Vec<Vec<DrawPart>> = Vec::new();
+        let mut free_triangles = 0;
+        for (part, triangles) in parts {
+            let is_same_kind = |parts: &[DrawPart]| self.kind_of_all(parts) == self.kind_of(&part);
+            match chunk_parts.last_mut().filter(|parts| triangles <= free_triangles && is_same_kind(parts)) {
+                Some(parts) => parts.push(part),
+                None => {
+                    chunk_parts.push(vec![part]);
+                    free_triangles = TRIANGLES_PER_CHUNK;
+                }
+            }
+            free_triangles -= triangles.min(free_triangles);
+        }
+        chunk_parts
+    }
+
     fn project_terrain(&mut self, camera: &Camera, terrain: Option<&PlacedMesh>) {
         let vertices = terrain.map_or(&[][..], |mesh| &mesh.vertices);
         let project = |&[x, y, z, u, v]: &[f32; 5]| camera.project(camera.in_camera_m([x, y, z]), [u, v]);
@@ -300,7 +342,7 @@ impl RasterScene {
         }
         chunk_parts.par_iter().zip(&mut *chunks).for_each(|(parts, chunk)| {
             chunk.clear();
-            chunk.is_terrain = matches!(parts.first(), Some(DrawPart::Terrain(_)));
+            chunk.kind = self.kind_of_all(parts);
             self.triangles_of(context, parts, chunk);
             on_set_up(chunk);
             chunk.bin(bands);
@@ -392,8 +434,9 @@ impl RasterScene {
                 depth.fill(0.0);
             }
             visible.fill(SKY);
-            let band = Band { number, stride, depth, visible };
-            widest!(vectors => fill_band(vectors, placements, &shader, band, color))
+            let mut band = Band { number, stride, depth, visible };
+            fill_band(placements, &shader, &mut band, color);
+            layers::draw(placements, &shader, &mut band, color);
         };
         match shaded_px {
             Some(_) => bands
@@ -407,16 +450,20 @@ impl RasterScene {
     }
 }
 
-/// Depths of a band, and colours as far as there is room for them.
+/// Depths of a band, and colours as far as there is room for them, without layers.
+fn fill_band(placements: impl SamplePattern, shader: &Shader<'_>, band: &mut Band<'_>, color: &mut [u16]) {
+    widest!(vectors => fill_band_by(vectors, placements, shader, band, color))
+}
+
 #[inline(always)]
-fn fill_band(
+fn fill_band_by(
     vectors: impl Vectors,
     placements: impl SamplePattern,
     shader: &Shader<'_>,
-    mut band: Band<'_>,
+    band: &mut Band<'_>,
     color: &mut [u16],
 ) {
-    for (number, chunk) in (0..).zip(shader.chunks) {
+    for (number, chunk) in (0..).zip(shader.chunks).filter(|(_, chunk)| chunk.kind < ChunkKind::Masked) {
         band.draw(vectors, placements, chunk, number, |_| true);
     }
     let width = shader.camera.size_px[0] as usize;
@@ -449,53 +496,27 @@ fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(DrawPart, usize)> {
         .collect()
 }
 
-/// Distributes parts to chunks in order: at most [`TRIANGLES_PER_CHUNK`] triangles each, few chunks even for
-/// many different meshes, and terrain apart from meshes.
-fn chunk_parts(parts: Vec<(DrawPart, usize)>) -> Vec<Vec<DrawPart>> {
-    let mut chunk_parts: Vec<Vec<DrawPart>> = Vec::new();
-    let mut free_triangles = 0;
-    for (part, triangles) in parts {
-        let is_terrain = |part: &DrawPart| matches!(part, DrawPart::Terrain(_));
-        let is_same_kind =
-            |parts: &[DrawPart]| parts.first().is_some_and(|first| is_terrain(first) == is_terrain(&part));
-        match chunk_parts.last_mut().filter(|parts| triangles <= free_triangles && is_same_kind(parts)) {
-            Some(parts) => parts.push(part),
-            None => {
-                chunk_parts.push(vec![part]);
-                free_triangles = TRIANGLES_PER_CHUNK;
-            }
-        }
-        free_triangles -= triangles.min(free_triangles);
-    }
-    chunk_parts
-}
-
 fn material(batch: &Batch, texture: Arc<SurfaceTexture>) -> Material {
-    let tint = |vertex: usize| {
-        batch
-            .shape
-            .vertices
-            .get(vertex)
-            .map_or([1.0; 3], |vertex| [vertex.tint[0], vertex.tint[1], vertex.tint[2]])
-    };
+    let tint = |vertex: usize| batch.shape.vertices.get(vertex).map_or([1.0; 4], |vertex| vertex.tint);
     let first = tint(0);
     let has_extra_attributes =
         batch.light.is_some() || (0..batch.shape.vertices.len()).any(|vertex| tint(vertex) != first);
     let sky = batch.light.map(|light| light.sky as f32);
-    Material { texture, tint: first, emissive: batch.material.emissive, has_extra_attributes, sky }
+    let camsim_core::scene::Material { emissive, blends, cutoff, .. } = batch.material;
+    Material { texture, tint: first, emissive, blends, cutoff, has_extra_attributes, sky }
 }
 
-/// Textures of the batches; those with the same image and wrap modes are shared.
+/// Textures of the batches; those with the same image that are read alike are shared.
 #[derive(Default)]
-struct TextureCache(HashMap<(*const Texture, [u8; 2]), Arc<SurfaceTexture>>);
+struct TextureCache(HashMap<(*const Texture, Reading), Arc<SurfaceTexture>>);
 
 impl TextureCache {
-    fn triangles_of_piece(&mut self, batch: &Batch) -> Arc<SurfaceTexture> {
-        let material = &batch.material;
-        let cache_key = (Arc::as_ptr(&material.texture), material.wrap.map(|wrap| wrap as u8));
+    fn of_batch(&mut self, batch: &Batch) -> Arc<SurfaceTexture> {
+        let camsim_core::scene::Material { texture, wrap, nearest, blends, .. } = &batch.material;
+        let reading = Reading { wrap: *wrap, nearest: *nearest, premultiplied: *blends };
         self.0
-            .entry(cache_key)
-            .or_insert_with(|| Arc::new(SurfaceTexture::new(&material.texture, material.wrap, None)))
+            .entry((Arc::as_ptr(texture), reading))
+            .or_insert_with(|| Arc::new(SurfaceTexture::new(texture, reading, None)))
             .clone()
     }
 }

@@ -144,12 +144,6 @@ impl Material {
         self.emissive.iter().any(|&light| light > 1.0)
     }
 
-    /// Whether its picture is read between texels, and is not mirrored beyond its borders.
-    #[must_use]
-    pub fn is_bilinear(&self) -> bool {
-        self.texture.size_px == [1, 1] || (!self.nearest && !self.wrap.contains(&Wrap::Mirror))
-    }
-
     /// Whether two materials share their texture and are otherwise equal.
     pub fn is_same_as(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.texture, &other.texture)

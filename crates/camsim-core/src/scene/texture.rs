@@ -41,7 +41,7 @@ impl Encoding {
 }
 
 /// Wrap mode: the continuation of a texture outside of 0..=1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// The nearest border pixel.
     #[default]

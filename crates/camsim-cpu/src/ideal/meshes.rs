@@ -133,9 +133,9 @@ impl Piece {
         };
         for (k, vertex) in self.vertices.iter().enumerate() {
             if scratch.is_used[k] {
-                let ([u, v], [r, g, b, _], [sun, down]) = (vertex.uv, vertex.tint, extra(k));
+                let ([u, v], [r, g, b, a], [sun, down]) = (vertex.uv, vertex.tint, extra(k));
                 scratch.vertices[k] =
-                    camera.project(camera_map.in_camera_m(vertex.position_m), [u, v, r, g, b, sun, down]);
+                    camera.project(camera_map.in_camera_m(vertex.position_m), [u, v, r, g, b, a, sun, down]);
             }
         }
         self.add(vectors, camera, scratch, kind, chunk);

@@ -14,7 +14,7 @@ use super::{
     rasterise::{self, Band, QuadCentres, ROW_PADDING, SKY},
     sampled_tiles::{BandTiles, SampledTiles, TILE_PX},
     shade::{Block, PixelPlanes, Shader},
-    triangles::{BAND_ROWS, Chunk},
+    triangles::{BAND_ROWS, Chunk, ChunkKind},
 };
 use crate::large_pages::LargeArray;
 use crate::simd::{
@@ -73,7 +73,7 @@ impl Multisample {
 
     /// Adds the tiles of mesh triangles, which may be thinner than a pixel.
     pub fn add_meshes(&self, chunk: &Chunk) {
-        if !chunk.is_terrain {
+        if chunk.kind != ChunkKind::Terrain {
             self.tiles.add_triangles(&chunk.raster);
         }
     }
@@ -114,7 +114,7 @@ impl Multisample {
 /// Draws the terrain at pixel centres; where meshes are, the samples determine everything.
 #[inline(always)]
 fn draw_centres(vectors: impl Vectors, shader: &Shader<'_>, band: &mut Band<'_>) {
-    for (number, chunk) in (0..).zip(shader.chunks).filter(|(_, chunk)| chunk.is_terrain) {
+    for (number, chunk) in (0..).zip(shader.chunks).filter(|(_, chunk)| chunk.kind == ChunkKind::Terrain) {
         band.draw(vectors, QuadCentres, chunk, number, |_| true);
     }
 }
@@ -203,7 +203,7 @@ impl BandSamples {
         for (number, chunk) in (0..).zip(shader.chunks) {
             // Tiles with mesh triangles are in the set.
             band.draw(vectors, rasterise::SamplePositions, chunk, number, |triangle| {
-                !chunk.is_terrain || tiles.has(triangle)
+                chunk.kind != ChunkKind::Terrain || tiles.has(triangle)
             });
         }
     }

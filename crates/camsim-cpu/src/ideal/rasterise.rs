@@ -51,6 +51,7 @@ pub(super) trait SamplePattern: Copy + Send + Sync {
         alternating(Self::OFFSETS_Y[1], Self::OFFSETS_Y[0]),
     ];
 
+    /// Offset of a position from its pixel's centre, quarters of a pixel.
     fn sample_offset(column: usize, row: usize) -> [i32; 2] {
         [Self::OFFSETS_X[row % 2], Self::OFFSETS_Y[column % 2]]
     }
@@ -150,10 +151,10 @@ pub(super) fn covers_any_position<P: SamplePattern>(
 }
 
 /// Extent of a triangle in a band.
-struct BandExtent {
-    rows: Range<usize>,
+pub(super) struct BandExtent {
+    pub rows: Range<usize>,
     /// First and last column.
-    columns: [usize; 2],
+    pub columns: [usize; 2],
     /// Distance from the triangle's first pixel to the first column, quarters of a pixel.
     right: i32,
 }
@@ -174,22 +175,32 @@ impl Band<'_> {
             if !is_wanted(triangle) {
                 continue;
             }
-            let id = number << CHUNK_BITS | index;
-            match chunk.large.get(triangle.large as usize) {
-                None => self.draw_small::<P>(vectors, triangle, id),
-                Some([inverse_depth, ..]) => {
-                    (0..P::PERIOD).for_each(|first| self.draw_large::<P>(triangle, inverse_depth, id, first))
-                }
+            self.draw_triangle::<P>(vectors, chunk, triangle, number << CHUNK_BITS | index);
+        }
+    }
+
+    #[inline(always)]
+    pub fn draw_triangle<P: SamplePattern>(
+        &mut self,
+        vectors: impl Vectors,
+        chunk: &Chunk,
+        triangle: &RasterTriangle,
+        id: u32,
+    ) {
+        match chunk.large.get(triangle.large as usize) {
+            None => self.draw_small::<P>(vectors, triangle, id),
+            Some([inverse_depth, ..]) => {
+                (0..P::PERIOD).for_each(|first| self.draw_large::<P>(triangle, inverse_depth, id, first))
             }
         }
     }
 
-    fn first_row<P: SamplePattern>(&self) -> usize {
+    pub fn first_row<P: SamplePattern>(&self) -> usize {
         self.number * (BAND_ROWS / P::STEP)
     }
 
     #[inline(always)]
-    fn extent<P: SamplePattern>(&self, triangle: &RasterTriangle) -> BandExtent {
+    pub fn extent<P: SamplePattern>(&self, triangle: &RasterTriangle) -> BandExtent {
         let position = |[x, y]: [u16; 2]| [usize::from(x) / P::STEP, usize::from(y) / P::STEP];
         let (first, last) = (position(triangle.first), position(triangle.last));
         let first_row = self.first_row::<P>();

@@ -12,7 +12,7 @@ use super::{
     vertices::Camera,
 };
 use crate::simd::{
-    lanes::{LANES, Lanes, Lanes2, per_lane},
+    lanes::{LANES, Lanes, Lanes2, clamp_to, fast_max, per_lane},
     vectors::Vectors,
 };
 
@@ -20,9 +20,13 @@ use crate::simd::{
 #[derive(Debug)]
 pub(super) struct Material {
     pub texture: Arc<SurfaceTexture>,
-    /// Tint, if it is constant over the surface.
-    pub tint: [f32; 3],
+    /// Tint and alpha, if they are constant over the surface.
+    pub tint: [f32; 4],
     pub emissive: [f32; 3],
+    /// Whether it is mixed with what is behind it.
+    pub blends: bool,
+    /// Alpha of the full-size picture, times that of the vertices, from which on there is depth, or any surface.
+    pub cutoff: Option<f32>,
     /// Whether triangles have their own tint or illumination.
     pub has_extra_attributes: bool,
     /// Strength of the sky's light, if the surface is illuminated.
@@ -50,6 +54,9 @@ const NO_SURFACE: Surface = Surface {
     extra: 0,
     large: SMALL,
 };
+
+/// Alpha below which the colour of a blended surface does not matter.
+const LEAST_ALPHA: f32 = 1e-6;
 
 /// Pixels of one triangle per loop iteration.
 const RUN_LANES: usize = 8;
@@ -153,6 +160,11 @@ impl Shader<'_> {
         &chunk.surfaces[(visible & ((1 << CHUNK_BITS) - 1)) as usize]
     }
 
+    /// Whether a triangle is mixed with what is behind it.
+    pub fn blends(&self, visible: u32) -> bool {
+        self.materials.get(self.surface(visible).material as usize).is_some_and(|material| material.blends)
+    }
+
     pub fn chunk(&self, visible: u32) -> &Chunk {
         &self.chunks[(visible >> CHUNK_BITS) as usize]
     }
@@ -188,7 +200,7 @@ impl Shader<'_> {
         }
     }
 
-    /// Linear R G B A of a block; the sky's colour where there is no surface.
+    /// Linear R G B of a block, not premultiplied, and alpha; the sky's colour where there is no surface.
     #[inline(always)]
     pub fn colors(&self, vectors: impl Vectors, block: &Block, planes: &mut PixelPlanes) -> Colors {
         let [r, g, b, _] = self.camera.uniforms.sky;
@@ -280,31 +292,69 @@ impl Shader<'_> {
             if !is_active[i] {
                 continue;
             }
-            let tint = if material.has_extra_attributes {
-                self.tint(material, block, i, attributes.z[i])
-            } else {
-                material.tint
-            };
+            let tint = self.tint(material, block, i, attributes.z[i]);
+            if material.blends {
+                let alpha = texture_colors[i][3];
+                for k in 0..3 {
+                    let premultiplied = texture_colors[i][k].mul_add(tint[k], material.emissive[k] * alpha);
+                    colors[i][k] = premultiplied / fast_max(alpha, LEAST_ALPHA);
+                }
+                // Beyond the triangle, at pixels that it covers in part, vertices' alpha may exceed 1.
+                colors[i][3] = alpha * clamp_to(tint[3], 1.0);
+                continue;
+            }
             for k in 0..3 {
                 colors[i][k] = texture_colors[i][k].mul_add(tint[k], material.emissive[k]);
             }
         }
     }
 
-    /// Tint of a triangle with its own tint, times its illumination.
+    /// Whether the surfaces of a block have depth: alpha is not below their cut-off.
     #[inline(always)]
-    fn tint(&self, material: &Material, Block { visible, positions }: &Block, i: usize, z: f32) -> [f32; 3] {
+    pub fn has_depth(&self, vectors: impl Vectors, block: &Block, planes: &mut PixelPlanes) -> [bool; LANES] {
+        let attributes = self.attributes(block, planes);
+        let (mut has_depth, mut remaining) = ([true; LANES], attributes.material);
+        while let Some(&number) = remaining.iter().find(|&&material| material != SKY) {
+            let material = &self.materials[number as usize];
+            let mut is_active = [false; LANES];
+            for i in 0..LANES {
+                is_active[i] = attributes.material[i] == number;
+                remaining[i] = if is_active[i] { SKY } else { remaining[i] };
+            }
+            let Some(cutoff) = material.cutoff else { continue };
+            let alpha = match &*material.texture {
+                SurfaceTexture::Uniform([.., alpha]) => [*alpha; LANES],
+                SurfaceTexture::MipImage(image) => {
+                    image.alpha(vectors, &attributes.coordinates.uv, &is_active)
+                }
+            };
+            for i in 0..LANES {
+                if is_active[i] {
+                    let [.., tint] = self.tint(material, block, i, attributes.z[i]);
+                    has_depth[i] = alpha[i] * tint >= cutoff;
+                }
+            }
+        }
+        has_depth
+    }
+
+    /// Tint of a triangle, times its illumination, and alpha.
+    #[inline(always)]
+    fn tint(&self, material: &Material, Block { visible, positions }: &Block, i: usize, z: f32) -> [f32; 4] {
+        if !material.has_extra_attributes {
+            return material.tint;
+        }
         let surface = self.surface(visible[i]);
         let chunk = self.chunk(visible[i]);
         if surface.extra & FLAT != 0 {
             return chunk.flat_tints[(surface.extra & !FLAT) as usize];
         }
-        let [r, g, b, sun, down] = &chunk.extra[surface.extra as usize];
+        let [r, g, b, a, sun, down] = &chunk.extra[surface.extra as usize];
         let offset_px = [positions.x[i] - surface.first[0], positions.y[i] - surface.first[1]];
         let attribute = |plane: &Plane| at(*plane, offset_px) * z;
         TriangleKind::illuminated(
             material.sky,
-            [attribute(r), attribute(g), attribute(b), attribute(sun), attribute(down)],
+            [attribute(r), attribute(g), attribute(b), attribute(a), attribute(sun), attribute(down)],
         )
     }
 

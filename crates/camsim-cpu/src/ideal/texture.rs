@@ -4,7 +4,7 @@ use camsim_core::scene::{TexelForm, Texture, Wrap};
 
 use crate::large_pages::LargeArray;
 use crate::simd::{
-    lanes::{LANES, Lanes, clamp_to, fast_min, per_lane, to_index},
+    lanes::{LANES, Lanes, ZERO, clamp_to, fast_min, per_lane, to_index},
     vectors::Vectors,
 };
 
@@ -34,28 +34,38 @@ pub(super) struct MipImage {
     heights: [f32; MAX_LEVELS],
     /// Index of the coarsest level.
     last_level: f32,
-    repeats: [bool; 2],
+    reading: Reading,
+}
+
+/// How an image is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Reading {
+    pub wrap: [Wrap; 2],
+    /// Whether the full-size image, if it alone is read, is read at its nearest texel.
+    pub nearest: bool,
+    /// Whether reads are weighted by alpha, as blended surfaces need it.
+    pub premultiplied: bool,
 }
 
 /// Weighted sums of the reads of each pixel: R G B A of the left texels, then of the right ones.
 pub(super) type Sums = [[f32; 2 * CHANNELS]; LANES];
 
 impl SurfaceTexture {
-    /// Texture with bilinear filtering. `border` is the colour around its coarser levels, if they have one.
-    pub fn new(texture: &Texture, wrap: [Wrap; 2], border: Option<[u8; 4]>) -> Self {
+    /// `border` is the colour around its coarser levels, if they have one.
+    pub fn new(texture: &Texture, reading: Reading, border: Option<[u8; 4]>) -> Self {
         match texture.size_px {
-            [1, 1] => Self::Uniform(texture.linear_at([0, 0])),
-            _ => Self::MipImage(Box::new(MipImage::new(
-                texture,
-                wrap.map(|wrap| wrap == Wrap::Repeat),
-                border,
-            ))),
+            [1, 1] => {
+                let [r, g, b, a] = texture.linear_at([0, 0]);
+                let weight = if reading.premultiplied { a } else { 1.0 };
+                Self::Uniform([weight * r, weight * g, weight * b, a])
+            }
+            _ => Self::MipImage(Box::new(MipImage::new(texture, reading, border))),
         }
     }
 }
 
 impl MipImage {
-    fn new(texture: &Texture, repeats: [bool; 2], border: Option<[u8; 4]>) -> Self {
+    fn new(texture: &Texture, reading: Reading, border: Option<[u8; 4]>) -> Self {
         let mut texels = Self {
             values: LargeArray::default(),
             offsets: [0; MAX_LEVELS],
@@ -63,7 +73,7 @@ impl MipImage {
             widths: [1.0; MAX_LEVELS],
             heights: [1.0; MAX_LEVELS],
             last_level: 0.0,
-            repeats,
+            reading,
         };
         let mips = texture.mips_with_border(TexelForm::Light, border);
         let sizes = [texture.size_px].into_iter().chain(mips.iter().map(|mip| mip.size_px));
@@ -82,7 +92,7 @@ impl MipImage {
         (self.offsets[index], self.strides[index]) = (begin as u32, stride as u32);
         (self.widths[index], self.heights[index]) = (width as f32, height as f32);
         self.last_level = index as f32;
-        let [repeats, repeats_rows] = self.repeats;
+        let [repeats, repeats_rows] = self.reading.wrap.map(|wrap| wrap == Wrap::Repeat);
         let end = begin + padded_len(size_px);
         let rows = (0..height).chain([if repeats_rows { 0 } else { height - 1 }]);
         for (row, into) in rows.zip(self.values[begin..end].chunks_exact_mut(stride)) {
@@ -101,9 +111,45 @@ impl MipImage {
         [self.widths[0], self.heights[0]]
     }
 
+    /// Alpha of the full-size image.
+    #[inline(always)]
+    pub fn alpha(&self, vectors: impl Vectors, [u, v]: &[Lanes; 2], is_active: &[bool; LANES]) -> Lanes {
+        let mut sums = NO_SUMS;
+        let is_nearest = [self.reading.nearest; LANES];
+        self.add_level(vectors, u, v, &ZERO, &[1.0; LANES], is_active, &is_nearest, &mut sums);
+        per_lane(|i| sums[i][CHANNELS - 1] + sums[i][2 * CHANNELS - 1])
+    }
+
     /// Adds a weighted trilinear read for each active pixel.
     #[inline(always)]
     pub fn add_trilinear(
+        &self,
+        vectors: impl Vectors,
+        u: &Lanes,
+        v: &Lanes,
+        level: &Lanes,
+        weight: &Lanes,
+        is_active: &[bool; LANES],
+        sums: &mut Sums,
+    ) {
+        if !self.reading.premultiplied {
+            return self.add_straight(vectors, u, v, level, weight, is_active, sums);
+        }
+        let mut own = NO_SUMS;
+        self.add_straight(vectors, u, v, level, &[1.0; LANES], is_active, &mut own);
+        let own = colors(&own);
+        for i in 0..LANES {
+            let [r, g, b, a] = own[i];
+            let premultiplied = [a * r, a * g, a * b, a];
+            for k in 0..CHANNELS {
+                sums[i][k] = weight[i].mul_add(premultiplied[k], sums[i][k]);
+            }
+        }
+    }
+
+    /// As `add_trilinear`, not premultiplied.
+    #[inline(always)]
+    fn add_straight(
         &self,
         vectors: impl Vectors,
         u: &Lanes,
@@ -117,7 +163,11 @@ impl MipImage {
         let fraction = per_lane(|i| clamp_to(level[i], self.last_level) - below[i]);
         let is_between = fraction.iter().any(|&fraction| fraction > 0.0);
         let weight_below = per_lane(|i| weight[i] * (1.0 - fraction[i]));
-        self.add_level(vectors, u, v, &below, &weight_below, is_active, sums);
+        let mut is_nearest = [false; LANES];
+        for i in 0..LANES {
+            is_nearest[i] = self.reading.nearest & (below[i] == 0.0) & (fraction[i] == 0.0);
+        }
+        self.add_level(vectors, u, v, &below, &weight_below, is_active, &is_nearest, sums);
         if is_between {
             let above = per_lane(|i| fast_min(below[i] + 1.0, self.last_level));
             let weight_above = per_lane(|i| weight[i] * fraction[i]);
@@ -125,7 +175,7 @@ impl MipImage {
             for i in 0..LANES {
                 is_blended[i] = is_active[i] & (fraction[i] > 0.0);
             }
-            self.add_level(vectors, u, v, &above, &weight_above, &is_blended, sums);
+            self.add_level(vectors, u, v, &above, &weight_above, &is_blended, &[false; LANES], sums);
         }
     }
 
@@ -138,6 +188,7 @@ impl MipImage {
         level: &Lanes,
         weight: &Lanes,
         is_active: &[bool; LANES],
+        is_nearest: &[bool; LANES],
         sums: &mut Sums,
     ) {
         let (mut width, mut height) = ([self.widths[0]; LANES], [self.heights[0]; LANES]);
@@ -150,8 +201,12 @@ impl MipImage {
             }
         }
         let halves = &*self.values;
-        let (x, across) = texel_and_weight(u, &width, self.repeats[0]);
-        let (y, down) = texel_and_weight(v, &height, self.repeats[1]);
+        let (x, mut across) = texel_and_weight(u, &width, self.reading.wrap[0]);
+        let (y, mut down) = texel_and_weight(v, &height, self.reading.wrap[1]);
+        if self.reading.nearest {
+            across = per_lane(|i| if is_nearest[i] { (across[i] + 0.5).floor() } else { across[i] });
+            down = per_lane(|i| if is_nearest[i] { (down[i] + 0.5).floor() } else { down[i] });
+        }
         let mut first = [0; LANES];
         for i in 0..LANES {
             first[i] = begin[i] + to_index(y[i]) * stride[i] + CHANNELS as u32 * to_index(x[i]);
@@ -183,13 +238,19 @@ fn padded_len([width, height]: [u32; 2]) -> usize {
 
 /// Texel before a position along an axis, and interpolation weight.
 #[inline(always)]
-fn texel_and_weight(coordinate: &Lanes, size: &Lanes, repeats: bool) -> (Lanes, Lanes) {
-    let mut position = per_lane(|i| coordinate[i] * size[i] - 0.5);
-    if repeats {
-        position = per_lane(|i| clamp_to(position[i] - (position[i] / size[i]).floor() * size[i], size[i]));
-    } else {
-        position = per_lane(|i| clamp_to(position[i], size[i] - 1.0));
-    }
+fn texel_and_weight(coordinate: &Lanes, size: &Lanes, wrap: Wrap) -> (Lanes, Lanes) {
+    let position = match wrap {
+        Wrap::Clamp => per_lane(|i| clamp_to(coordinate[i] * size[i] - 0.5, size[i] - 1.0)),
+        Wrap::Repeat => {
+            let position = per_lane(|i| coordinate[i] * size[i] - 0.5);
+            per_lane(|i| clamp_to(position[i] - (position[i] / size[i]).floor() * size[i], size[i]))
+        }
+        Wrap::Mirror => {
+            let along = per_lane(|i| coordinate[i] - 2.0 * (0.5 * coordinate[i]).floor());
+            let within = per_lane(|i| fast_min(along[i], 2.0 - along[i]));
+            per_lane(|i| clamp_to(within[i] * size[i] - 0.5, size[i] - 1.0))
+        }
+    };
     let first = per_lane(|i| fast_min(position[i].floor(), size[i] - 1.0));
     let fraction = per_lane(|i| position[i] - first[i]);
     (first, fraction)

@@ -18,9 +18,9 @@ const THIN_STEPS: i64 = 8;
 const SMALLER_STEPS2: i64 = 2 * (SUBPIXELS * SUBPIXELS) as i64;
 /// Rows per band.
 pub(super) const BAND_ROWS: usize = 32;
-/// Number of vertex attributes besides texture coordinates, if any: tint, and for illumination the components
-/// of the normal towards the sun and down.
-pub(super) const EXTRA_ATTRIBUTES: usize = 5;
+/// Number of vertex attributes besides texture coordinates, if any: tint with alpha, and for illumination the
+/// components of the normal towards the sun and down.
+pub(super) const EXTRA_ATTRIBUTES: usize = 6;
 
 /// An attribute as a plane over the image: value at the triangle's first pixel, and derivatives along x and
 /// y.
@@ -76,18 +76,29 @@ pub(super) struct TriangleKind {
 impl TriangleKind {
     /// Tint times illumination, from the [`EXTRA_ATTRIBUTES`] attributes. Twin of shaders/ideal/light.wgsl.
     #[inline(always)]
-    pub fn illuminated(sky: Option<f32>, [r, g, b, sun, down]: [f32; EXTRA_ATTRIBUTES]) -> [f32; 3] {
-        let Some(sky) = sky else { return [r, g, b] };
+    pub fn illuminated(sky: Option<f32>, [r, g, b, a, sun, down]: [f32; EXTRA_ATTRIBUTES]) -> [f32; 4] {
+        let Some(sky) = sky else { return [r, g, b, a] };
         let light = fast_min(fast_max(fast_max(sun, 0.0) + sky * 0.5 * (1.0 - down), 0.0), 1.0);
-        [r * light, g * light, b * light]
+        [r * light, g * light, b * light, a]
     }
+}
+
+/// What the triangles of a chunk are part of, in drawing order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum ChunkKind {
+    #[default]
+    Terrain,
+    Opaque,
+    /// Meshes with holes.
+    Masked,
+    /// Meshes that are mixed with what is behind them.
+    Blended,
 }
 
 /// Triangles that are set up together, in drawing order.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
-    /// Whether they belong to the terrain, not to meshes.
-    pub is_terrain: bool,
+    pub kind: ChunkKind,
     pub raster: Vec<RasterTriangle>,
     pub surfaces: Vec<Surface>,
     /// Planes of large triangles in double precision, near / z and texture coordinates: towards a horizon
@@ -96,7 +107,7 @@ pub(super) struct Chunk {
     /// Planes of the additional attributes.
     pub extra: Vec<[Plane; EXTRA_ATTRIBUTES]>,
     /// Illuminated tints of triangles whose vertices have equal attributes.
-    pub flat_tints: Vec<[f32; 3]>,
+    pub flat_tints: Vec<[f32; 4]>,
     /// Indices of the triangles, sorted by band.
     in_band: Vec<u32>,
     band_starts: Vec<u32>,
@@ -280,18 +291,17 @@ impl Chunk {
         let sign = if is_front { 1.0 } else { -1.0 };
         let [a, b, c] = vertices;
         if a.attributes[2..] == b.attributes[2..] && a.attributes[2..] == c.attributes[2..] {
-            let attribute = |k: usize| if k < 3 { a.attributes[2 + k] } else { sign * a.attributes[2 + k] };
-            self.flat_tints.push(TriangleKind::illuminated(
-                sky,
-                [attribute(0), attribute(1), attribute(2), attribute(3), attribute(4)],
-            ));
+            let attribute = |k: usize| if k < 4 { a.attributes[2 + k] } else { sign * a.attributes[2 + k] };
+            let attributes =
+                [attribute(0), attribute(1), attribute(2), attribute(3), attribute(4), attribute(5)];
+            self.flat_tints.push(TriangleKind::illuminated(sky, attributes));
             return FLAT | (self.flat_tints.len() as u32 - 1);
         }
-        let (mut sun, mut down) = (plane(5), plane(6));
+        let (mut sun, mut down) = (plane(6), plane(7));
         for k in 0..3 {
             (sun[k], down[k]) = (sign * sun[k], sign * down[k]);
         }
-        self.extra.push([plane(2), plane(3), plane(4), sun, down]);
+        self.extra.push([plane(2), plane(3), plane(4), plane(5), sun, down]);
         self.extra.len() as u32 - 1
     }
 

@@ -200,7 +200,7 @@ fn renderer_output(
     };
     let is_ideal = case.output == Output::Ideal;
     if !is_general && is_ideal && !cpu_rasterises(&sequence.scene, u32::MAX) {
-        return Err("the rasteriser draws no masks, mirrored pictures or blended surfaces");
+        return Err("the rasteriser does not draw the scene");
     }
     if !is_general && !is_ideal && !cpu_vectorises(plan) {
         return Err("the plan is not vectorised");
