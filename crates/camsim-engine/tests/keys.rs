@@ -11,7 +11,7 @@ use camsim_core::{
     sequence::Sequence,
 };
 use common::{
-    barrel_lens, city, engine, pattern,
+    barrel_lens, city, gpu_engine, pattern,
     rays::{assert_silhouettes_of_twin, black_ground_and_roof, expected, linear_psnr},
     render, render_at_phase, rolling, roof, scenario, sequence, steady,
 };
@@ -63,7 +63,7 @@ fn gathering_from_several_key_frames_agrees_with_its_twin() {
     let mut scene = pattern(400.0);
     scene.meshes.push(roof(60.0, 15.0));
     let sequence = sequence(scenario, trajectory, scene);
-    let done = render(&engine(), &sequence, &[Channel::Color], 0);
+    let done = render(&gpu_engine(), &sequence, &[Channel::Color], 0);
     assert_eq!(done.plan.keys.len(), 3);
     assert_silhouettes_of_twin(&sequence, &done);
 }
@@ -74,7 +74,7 @@ fn gathering_from_several_key_frames_agrees_with_its_twin() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn board_edges_are_exact_with_several_key_frames() {
-    let engine = engine();
+    let engine = gpu_engine();
     for (name, delay_ms, readout_ms, exposure_ms) in
         [("delay", 1000.0, 0.0, 0.0), ("rolling shutter", 0.0, 1000.0, 0.0), ("all", 1000.0, 1000.0, 200.0)]
     {
@@ -142,7 +142,7 @@ const FLIGHTS: [(&str, Flight); 6] = [
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn sources_and_depths_over_buildings_are_exact() {
-    let engine = engine();
+    let engine = gpu_engine();
     let mut unseen = 0;
     for (name, flight) in &FLIGHTS[1..5] {
         for (keys, phase) in [(Auto::Value(1), 0.0), (Auto::Auto, 0.5)] {
@@ -192,7 +192,7 @@ fn worst_depth(oracle: &Oracle, frame: &RenderedFrame) -> f64 {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn second_key_frame_fills_disocclusions() {
-    let engine = engine();
+    let engine = gpu_engine();
     let (name, flight) = &FLIGHTS[5];
     let oracle = Oracle::new(flight.sequence(Auto::Auto, 1.0)).expect("a usable camera");
     let truth =
@@ -210,7 +210,7 @@ fn second_key_frame_fills_disocclusions() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn bytes_do_not_depend_on_the_order_of_frames_with_several_keys() {
-    let engine = engine();
+    let engine = gpu_engine();
     let sequence = FLIGHTS[4].1.sequence(Auto::Value(2), 1.0);
     let all = |order: [u64; 3]| {
         let mut session = engine.session::<Infallible>(sequence.clone(), &ALL).expect("session");

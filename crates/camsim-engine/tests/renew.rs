@@ -123,5 +123,8 @@ fn refused_sequence_leaves_the_session_unchanged() {
         ["camera.size_px is", "32768"]
     };
     assert!(expected.iter().all(|text| refused.contains(text)), "{refused}");
-    assert_eq!(next(&mut session, 3).color_rgba(), render_exact(&engine, &good, &COLOR, 3).frame.color_rgba());
+    assert_eq!(
+        next(&mut session, 3).color_rgba(),
+        render_exact(&engine, &good, &COLOR, 3).frame.color_rgba()
+    );
 }

@@ -13,7 +13,7 @@ use camsim_core::{
 use camsim_engine::Finished;
 use camsim_plan::EdgeStage;
 use common::{
-    barrel_lens, engine, pattern,
+    barrel_lens, gpu_engine, pattern,
     rays::{assert_silhouettes_of_twin, black_ground_and_roof, expected, linear_psnr},
     render, roof, scenario, sequence, steady,
 };
@@ -32,7 +32,7 @@ fn check(
     scene: &Scene,
     [at_least_db, four_at_least_db]: [f64; 2],
 ) {
-    let engine = engine();
+    let engine = gpu_engine();
     let made = |max_error_dn: f64, silhouettes: Silhouettes| {
         let mut scenario = scenario.clone();
         scenario.quality.max_error_dn = max_error_dn;
@@ -83,7 +83,7 @@ fn silhouette_rays_agree_with_their_twin() {
     scenario.camera.shutter = rolling(15.0);
     scenario.quality.key_frames = Auto::Value(1);
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
-    let done = render(&engine(), &sequence, &[Channel::Color], 0);
+    let done = render(&gpu_engine(), &sequence, &[Channel::Color], 0);
     assert_silhouettes_of_twin(&sequence, &done);
 }
 
@@ -154,7 +154,7 @@ fn ridge_depths_belong_to_one_ridge() {
     scenario.camera.focal_px = [96.0, 96.0];
     scenario.camera.mount.angles_deg = [4.0, -12.0, 0.0];
     scenario.camera.shutter = rolling(10.0);
-    let engine = engine();
+    let engine = gpu_engine();
     for (name, velocity, turn) in
         [("still", DVec3::ZERO, DVec3::ZERO), ("turning", DVec3::ZERO, TURN), ("flying", EAST, TURN)]
     {
@@ -206,7 +206,7 @@ fn only_triangles_near_silhouettes_are_multisampled() {
     scenario.quality.silhouettes = Silhouettes::Rays;
     scenario.quality.max_error_dn = COARSE_DN;
     let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
-    let engine = engine();
+    let engine = gpu_engine();
     let mut session =
         engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
     let mut all = 0;
@@ -236,7 +236,7 @@ fn edge_marks_agree_with_their_twin() {
     scenario.quality.silhouettes = Silhouettes::Rays;
     scenario.quality.max_error_dn = COARSE_DN;
     let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
-    let engine = engine();
+    let engine = gpu_engine();
     let mut session =
         engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
     session.render::<std::convert::Infallible>([0], &mut |_| Ok(())).expect("render");
@@ -262,7 +262,7 @@ fn edge_marks_agree_with_their_twin() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn surface_that_fills_the_view_has_no_silhouette_rays() {
     let sequence = sequence(camera(), steady(120.0, 0.0, EAST, TURN), pattern(6000.0));
-    let done = render(&engine(), &sequence, &[Channel::Color], 0);
+    let done = render(&gpu_engine(), &sequence, &[Channel::Color], 0);
     assert_eq!(done.plan.edges, EdgeStage::None);
     assert!(done.plan.skipped.iter().any(|skip| skip.what == "silhouette rays"));
 }
@@ -276,7 +276,7 @@ fn colours_do_not_depend_on_truth_channels() {
     scenario.camera.shutter = rolling(8.0);
     scenario.quality.silhouettes = Silhouettes::Plain;
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
-    let engine = engine();
+    let engine = gpu_engine();
     let plain = render(&engine, &sequence, &[Channel::Color], 0);
     let both = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
     assert_eq!(plain.plan.edges, EdgeStage::None);
@@ -306,7 +306,7 @@ fn resolved_depth_belongs_to_one_surface() {
     scenario.quality.silhouettes = Silhouettes::Rays;
     scenario.quality.max_error_dn = COARSE_DN;
     let sequence = sequence(scenario, steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
-    let engine = engine();
+    let engine = gpu_engine();
     let mut session =
         engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
     session.render::<std::convert::Infallible>([0], &mut |_| Ok(())).expect("render");
@@ -327,7 +327,7 @@ fn bytes_do_not_depend_on_the_order_of_frames() {
     let mut scenario = camera();
     scenario.camera.shutter = rolling(10.0);
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
-    let engine = engine();
+    let engine = gpu_engine();
     let all = |order: [u64; 4]| {
         let mut session =
             engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
@@ -357,7 +357,7 @@ fn tiny(size_px: [u32; 2], exposure_ms: f64, solver: Auto<Solver>) -> Scenario {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn single_pixel_frame_is_rendered() {
-    let engine = engine();
+    let engine = gpu_engine();
     let moving = (EAST, TURN);
     let forced = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| (Auto::Value(solver), moving));
     let still = DVec3::ZERO;

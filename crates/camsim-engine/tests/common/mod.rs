@@ -9,7 +9,7 @@ pub mod rays;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{scenario::Channel, sequence::Sequence};
-use camsim_engine::{AdapterChoice, Engine, Finished, IdealPlanes, Session};
+use camsim_engine::{AdapterChoice, Backend, Engine, Finished, IdealPlanes, Session};
 
 pub use fixtures::*;
 
@@ -17,6 +17,13 @@ pub use fixtures::*;
 pub fn engine() -> Engine {
     Engine::new(AdapterChoice::Software)
         .expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them")
+}
+
+/// The same adapter for all passes, also those that the cpu renderer makes in less time.
+pub fn gpu_engine() -> Engine {
+    let mut engine = engine();
+    engine.set_backend(Backend::Gpu);
+    engine
 }
 
 /// Whether textures are read and triangles drawn by code. Circuits weigh texels with 8 bits of fraction, and

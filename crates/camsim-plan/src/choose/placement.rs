@@ -3,7 +3,7 @@
 //! | machine | ideal frames | output frames |
 //! |---|---|---|
 //! | graphics card | gpu | gpu |
-//! | software adapter | cpu, vectorised, where it can draw the scene; else gpu | cpu, vectorised, from one ideal frame without silhouette rays; else gpu |
+//! | software adapter | cpu, where its vectorised code makes all passes of the frame; else gpu | cpu likewise, and of scenes that it cannot draw from a copy of one ideal frame without silhouette rays; else gpu |
 //! | no adapter, or `--backend cpu` | cpu | cpu |
 //!
 //! Shadows of the sun are made by the cpu: a frame of a scene with shadows has all its passes there, whatever
@@ -15,13 +15,13 @@
 use camsim_core::{
     scenario::Preset,
     scene::{Scene, is_whole},
-    shutter::RowAxis,
     temporal::TapStage,
 };
 
 use crate::ir::{
     frame_plan::FramePlan,
     placement::{AdapterClass, Backend, Capabilities, Placement, Renderer},
+    row_tables::table_shape,
     stages::{EdgeStage, RayStage, TemporalStage, scale_of},
 };
 
@@ -53,13 +53,12 @@ pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: b
         }
         (Backend::Auto, Some(AdapterClass::Card)) => gpu,
         (Backend::Auto, Some(AdapterClass::Software)) => {
-            // All other plans stay with the adapter, also those that the cpu vectorises: nothing says yet that it
-            // takes less time for them.
-            if !capabilities.has_vectors || !cpu_takes_copies(plan) {
+            // What the cpu does not vectorise stays with the adapter: its general code is slower.
+            if !capabilities.has_vectors {
                 gpu
-            } else if rasterises {
+            } else if rasterises && cpu_vectorises(plan) && cpu_draws(plan) {
                 cpu
-            } else if is_worth_the_copy(plan) {
+            } else if !rasterises && cpu_takes_copies(plan) && is_worth_the_copy(plan) {
                 gpu_then_cpu
             } else {
                 gpu
@@ -68,8 +67,8 @@ pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: b
     }
 }
 
-/// Whether the cpu's vectorised reverse pass makes frames of a plan: by rows that are rows of the picture, a
-/// solver that iterates on the depth or needs none, and grids of at most [`MOST_VECTOR_TAPS`] taps. Its general
+/// Whether the cpu's vectorised reverse pass makes frames of a plan: by lines of one instant (not so sideways
+/// readout of interlaced fields), a solver that iterates on the depth or needs none, and grids of at most [`MOST_VECTOR_TAPS`] taps. Its general
 /// pass makes all others.
 #[must_use]
 pub fn cpu_vectorises(plan: &FramePlan) -> bool {
@@ -78,13 +77,13 @@ pub fn cpu_vectorises(plan: &FramePlan) -> bool {
         TemporalStage::Identity | TemporalStage::Rotation | TemporalStage::Reproject { .. }
     );
     let has_map = plan.ray != RayStage::GaussNewton;
-    let has_rows = plan.shutter.row_axis() == RowAxis::Rows;
+    let has_one_field = table_shape(&plan.shutter).2 == 1;
     let has_few_taps = match plan.taps {
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most <= MOST_VECTOR_TAPS,
         TapStage::Bilinear | TapStage::Spline | TapStage::Area => true,
     };
     let has_sides = plan.ideal.size_px.iter().all(|&side| side >= 2);
-    plan.preset != Preset::Paper && solves && has_map && has_rows && has_few_taps && has_sides
+    plan.preset != Preset::Paper && solves && has_map && has_one_field && has_few_taps && has_sides
 }
 
 /// Whether the cpu makes frames of a plan from a copy of an ideal frame that an adapter has drawn: one, without
@@ -103,16 +102,14 @@ pub fn cpu_draws(plan: &FramePlan) -> bool {
     plan.preset != Preset::Paper && (plan.shadows.is_none() || scale == 1) && (is_within || !has_samples)
 }
 
-/// Whether the cpu's rasteriser draws a scene: pictures that one texture holds, none of them mirrored beyond
-/// its borders or read at the nearest texel, no alpha mask, no blended surface.
+/// Whether the cpu's rasteriser draws a scene: a ground picture that one texture holds, and no shadows beside
+/// surfaces with holes or blended ones, through which light falls.
 #[must_use]
 pub fn cpu_rasterises(scene: &Scene, max_picture_px: u32) -> bool {
     let ground = scene.terrain.as_ref().map(|terrain| terrain.texture.size_px);
+    let has_shadows = scene.light.is_some_and(|light| light.shadows);
     ground.is_none_or(|size_px| is_whole(size_px, max_picture_px))
-        && scene.meshes.iter().all(|mesh| {
-            let material = &mesh.material;
-            material.cutoff.is_none() && !material.blends && material.is_bilinear()
-        })
+        && (scene.has_triangle_borders_only() || !has_shadows)
 }
 
 /// Whether frames of a plan that the cpu vectorises take less time there although their ideal frame has to be
