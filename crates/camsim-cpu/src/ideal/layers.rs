@@ -43,14 +43,12 @@ pub(super) fn draw<P: SamplePattern>(_: P, shader: &Shader<'_>, band: &mut Band<
         |column: usize, row: usize| P::sample_offset(column, row).map(|quarters| 0.25 * quarters as f32);
     let offsets_px = [0, 1].map(|row| [0, 1].map(|column| offset_px(column, row)));
     let first_row = band.first_row::<P>();
-    widest!(vectors => mix(vectors, shader, &fragments, (first_row, &offsets_px), band, color))
+    mix(shader, &fragments, (first_row, &offsets_px), band, color);
 }
 
 /// Mixes the triangles of each position. `offsets_px` are those of positions from their pixels' centres in even and odd
 /// rows and columns.
-#[inline(always)]
 fn mix(
-    vectors: impl Vectors,
     shader: &Shader<'_>,
     fragments: &[Fragment],
     (first_row, offsets_px): (usize, &[[[f32; 2]; 2]; 2]),
@@ -66,10 +64,10 @@ fn mix(
             block.visible[i] = fragment.id;
             (block.positions.x[i], block.positions.y[i]) = (column as f32 + right, row as f32 + down);
         }
-        let has_depth = shader.has_depth(vectors, &block, &mut planes);
+        let has_depth = shader.has_depth(&block, &mut planes);
         let colors = match color.is_empty() {
             true => [[0.0; CHANNELS]; LANES],
-            false => shader.colors(vectors, &block, &mut planes),
+            false => shader.colors(&block, &mut planes),
         };
         for (i, fragment) in some.iter().enumerate() {
             if mixer.at != fragment.at {

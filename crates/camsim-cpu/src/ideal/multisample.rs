@@ -159,7 +159,7 @@ impl BandSamples {
                     let pixels = tile * TILE_PX..(tile + 1) * TILE_PX;
                     self.resolve(shader, [column, row], pixels, &mut block, depth);
                 }
-                let colors = shader.colors(vectors, &block, &mut planes);
+                let colors = shader.colors(&block, &mut planes);
                 let pairs =
                     color.as_chunks_mut::<8>().0.iter_mut().zip(colors.as_flattened().as_chunks::<8>().0);
                 pairs.for_each(|(out, pixels)| *out = vectors.halves_from_floats(*pixels));
@@ -286,7 +286,7 @@ impl BandSamples {
                 block.visible[i] = part.visible;
                 [block.positions.x[i], block.positions.y[i]] = part.centroid_px;
             }
-            let colors = shader.colors(vectors, &block, planes);
+            let colors = shader.colors(&block, planes);
             for (part, color) in parts.iter().zip(&colors) {
                 let sum = &mut self.mixed_pixels[part.pixel].1;
                 for k in 0..CHANNELS {

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::simd::{
     lanes::{LANES, Lanes, Lanes2, clamp_to, fast_max, per_lane},
-    vectors::Vectors,
+    vectors::{Vectors, widest},
 };
 
 /// Material of a surface.
@@ -184,7 +184,7 @@ impl Shader<'_> {
             return;
         }
         let positions = Lanes2 { x: per_lane(|i| (x + i) as f32), y: [y as f32; LANES] };
-        let colors = self.colors(vectors, &Block { visible: *visible, positions }, planes);
+        let colors = self.colors(&Block { visible: *visible, positions }, planes);
         let pairs = out.as_chunks_mut::<8>().0.iter_mut().zip(colors.as_flattened().as_chunks::<8>().0);
         for (pair, (out, pixels)) in pairs.enumerate() {
             let halves = vectors.halves_from_floats(*pixels);
@@ -201,8 +201,13 @@ impl Shader<'_> {
     }
 
     /// Linear R G B of a block, not premultiplied, and alpha; the sky's colour where there is no surface.
+    // Not inlined: the reads of textures are most of the crate's code.
+    pub fn colors(&self, block: &Block, planes: &mut PixelPlanes) -> Colors {
+        widest!(vectors => self.colors_by(vectors, block, planes))
+    }
+
     #[inline(always)]
-    pub fn colors(&self, vectors: impl Vectors, block: &Block, planes: &mut PixelPlanes) -> Colors {
+    fn colors_by(&self, vectors: impl Vectors, block: &Block, planes: &mut PixelPlanes) -> Colors {
         let [r, g, b, _] = self.camera.uniforms.sky;
         let mut colors = [[r, g, b, 1.0]; LANES];
         if block.visible.iter().any(|&visible| visible != SKY) {
@@ -310,8 +315,12 @@ impl Shader<'_> {
     }
 
     /// Whether the surfaces of a block have depth: alpha is not below their cut-off.
+    pub fn has_depth(&self, block: &Block, planes: &mut PixelPlanes) -> [bool; LANES] {
+        widest!(vectors => self.has_depth_by(vectors, block, planes))
+    }
+
     #[inline(always)]
-    pub fn has_depth(&self, vectors: impl Vectors, block: &Block, planes: &mut PixelPlanes) -> [bool; LANES] {
+    fn has_depth_by(&self, vectors: impl Vectors, block: &Block, planes: &mut PixelPlanes) -> [bool; LANES] {
         let attributes = self.attributes(block, planes);
         let (mut has_depth, mut remaining) = ([true; LANES], attributes.material);
         while let Some(&number) = remaining.iter().find(|&&material| material != SKY) {

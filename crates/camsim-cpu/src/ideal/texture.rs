@@ -132,33 +132,9 @@ impl MipImage {
         is_active: &[bool; LANES],
         sums: &mut Sums,
     ) {
-        if !self.reading.premultiplied {
-            return self.add_straight(vectors, u, v, level, weight, is_active, sums);
-        }
-        let mut own = NO_SUMS;
-        self.add_straight(vectors, u, v, level, &[1.0; LANES], is_active, &mut own);
-        let own = colors(&own);
-        for i in 0..LANES {
-            let [r, g, b, a] = own[i];
-            let premultiplied = [a * r, a * g, a * b, a];
-            for k in 0..CHANNELS {
-                sums[i][k] = weight[i].mul_add(premultiplied[k], sums[i][k]);
-            }
-        }
-    }
-
-    /// As `add_trilinear`, not premultiplied.
-    #[inline(always)]
-    fn add_straight(
-        &self,
-        vectors: impl Vectors,
-        u: &Lanes,
-        v: &Lanes,
-        level: &Lanes,
-        weight: &Lanes,
-        is_active: &[bool; LANES],
-        sums: &mut Sums,
-    ) {
+        let (premultiplied, read_weight) = (self.reading.premultiplied, weight);
+        let before = premultiplied.then(|| std::mem::replace(sums, NO_SUMS));
+        let weight = if premultiplied { &[1.0; LANES] } else { weight };
         let below = per_lane(|i| clamp_to(level[i], self.last_level).floor());
         let fraction = per_lane(|i| clamp_to(level[i], self.last_level) - below[i]);
         let is_between = fraction.iter().any(|&fraction| fraction > 0.0);
@@ -176,6 +152,16 @@ impl MipImage {
                 is_blended[i] = is_active[i] & (fraction[i] > 0.0);
             }
             self.add_level(vectors, u, v, &above, &weight_above, &is_blended, &[false; LANES], sums);
+        }
+        if let Some(mut before) = before {
+            let own = colors(sums);
+            for i in 0..LANES {
+                let [r, g, b, a] = own[i];
+                for (sum, premultiplied) in before[i].iter_mut().zip([a * r, a * g, a * b, a]) {
+                    *sum = read_weight[i].mul_add(premultiplied, *sum);
+                }
+            }
+            *sums = before;
         }
     }
 
