@@ -128,7 +128,9 @@ impl RayBvh {
             let RayBvhNode { boxes, holds } = &self.nodes[at as usize];
             for (lane, &held) in holds.iter().enumerate() {
                 let Aabb { min, max } = boxes.get(lane);
-                if !accept(&Aabb { min: min + self.middle, max: max + self.middle }) {
+                let bounds = Aabb { min: min + self.middle, max: max + self.middle };
+                // Lanes without a box hold nothing.
+                if bounds.is_empty() || !accept(&bounds) {
                     continue;
                 }
                 if held & ITEM == 0 { waiting.push(held) } else { found.push(held & !ITEM) }

@@ -5,7 +5,11 @@
 
 use std::sync::Arc;
 
-use camsim_core::{camera::CameraModel, scenario::Preset, sequence::Sequence};
+use camsim_core::{
+    camera::CameraModel,
+    scenario::{Preset, Primary},
+    sequence::Sequence,
+};
 use camsim_plan::{FramePlan, uniforms::Truth};
 use glam::DVec2;
 
@@ -16,8 +20,8 @@ use super::painter::{Painter, index};
 pub(crate) struct Missed {
     /// Made for the first frame that needs it.
     painter: Option<Painter>,
-    /// A camera, and which pixels have no ray, as far as these were looked for.
-    without_ray: Option<(Arc<CameraModel>, Vec<bool>)>,
+    /// The camera of each colour, and which pixels have no ray, as far as these were looked for.
+    without_ray: [Option<(Arc<CameraModel>, Vec<bool>)>; 3],
 }
 
 impl Missed {
@@ -58,7 +62,8 @@ impl Missed {
         if empty.is_empty() {
             return Vec::new();
         }
-        let known = self.without_ray.take().filter(|(camera, _)| *camera == plan.camera);
+        let of_color = &mut self.without_ray[plan.primary.map_or(0, Primary::channel)];
+        let known = of_color.take().filter(|(camera, _)| *camera == plan.camera);
         let (camera, mut without_ray) = known.unwrap_or_else(|| (plan.camera.clone(), vec![false; count]));
         let width = camera.size_px[0] as usize;
         let mut missed = Vec::new();
@@ -72,7 +77,7 @@ impl Missed {
                 None => without_ray[i] = true,
             }
         }
-        self.without_ray = Some((camera, without_ray));
+        *of_color = Some((camera, without_ray));
         missed
     }
 }
