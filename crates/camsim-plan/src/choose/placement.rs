@@ -3,8 +3,10 @@
 //! | machine | ideal frames | output frames |
 //! |---|---|---|
 //! | graphics card | gpu | gpu |
-//! | software adapter | cpu, where its vectorised code makes all passes of the frame; else gpu | cpu likewise, and of scenes that it cannot draw from a copy of one ideal frame without silhouette rays; else gpu |
+//! | software adapter | cpu, where it vectorises all passes; else gpu | cpu likewise, or from a copy; else gpu |
 //! | no adapter, or `--backend cpu` | cpu | cpu |
+//!
+//! A copy is one of an ideal frame that the cpu cannot draw, without silhouette rays.
 //!
 //! Shadows of the sun are made by the cpu: a frame of a scene with shadows has all its passes there, whatever
 //! the machine has.
@@ -67,9 +69,9 @@ pub(crate) fn place(capabilities: &Capabilities, plan: &FramePlan, rasterises: b
     }
 }
 
-/// Whether the cpu's vectorised reverse pass makes frames of a plan: by lines of one instant (not so sideways
-/// readout of interlaced fields), a solver that iterates on the depth or needs none, and grids of at most [`MOST_VECTOR_TAPS`] taps. Its general
-/// pass makes all others.
+/// Whether the cpu's vectorised reverse pass makes frames of a plan: by lines of one instant (all but those of
+/// sideways readout of interlaced fields), a solver that iterates on the depth or needs none, and grids of at most
+/// [`MOST_VECTOR_TAPS`] taps. Its general pass makes all others.
 #[must_use]
 pub fn cpu_vectorises(plan: &FramePlan) -> bool {
     let solves = matches!(
