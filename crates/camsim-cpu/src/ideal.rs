@@ -290,7 +290,7 @@ impl RasterScene {
         }
     }
 
-    /// That of all parts of a chunk.
+    /// The kind of all parts of a chunk, which is one.
     fn kind_of_all(&self, parts: &[DrawPart]) -> ChunkKind {
         parts.first().map_or(ChunkKind::default(), |part| self.kind_of(part))
     }

@@ -201,7 +201,7 @@ impl Shader<'_> {
     }
 
     /// Linear R G B of a block, not premultiplied, and alpha; the sky's colour where there is no surface.
-    // Not inlined: the reads of textures are most of the crate's code.
+    // Not inlined: the code that reads textures is long, and its callers are several.
     pub fn colors(&self, block: &Block, planes: &mut PixelPlanes) -> Colors {
         widest!(vectors => self.colors_by(vectors, block, planes))
     }
