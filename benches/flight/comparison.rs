@@ -196,6 +196,10 @@ pub const MS_TO_FIRST: Column = ("ms a frame to the first", |variant, first, _| 
 pub const TIMES_FIRST: Column =
     ("times the first's time", |variant, first, _| format!("{:.2}", median_ratio(&variant.ms, &first.ms)));
 
+/// Column: frame rate over that of the first row.
+pub const RATE_TO_FIRST: Column =
+    ("of the first's rate", |variant, first, _| format!("{:.2}", median_ratio(&first.ms, &variant.ms)));
+
 /// Column: how many times the paper preset's frame rate a variant has.
 pub const TIMES_PRESET: Column = ("times the preset's rate", |variant, _, preset| {
     preset.map_or(String::new(), |preset| format!("{:.2}", median_ratio(&preset.ms, &variant.ms)))

@@ -15,7 +15,7 @@ const LIMITS: RoundLimits = RoundLimits { burst: 8, rounds: 15, budget: Duration
 
 /// A key with values that change nothing, and with others. The empty key is the scenario as it is, once more: it
 /// shows how far two rows differ by chance.
-const FEATURES: [(&str, &str, Option<&str>, Option<&str>); 8] = [
+const FEATURES: [(&str, &str, Option<&str>, Option<&str>); 10] = [
     ("the same again", "", Some(""), None),
     (
         "chromatic aberration",
@@ -48,6 +48,18 @@ const FEATURES: [(&str, &str, Option<&str>, Option<&str>); 8] = [
         "camera.timing",
         Some("{ jitter_ms = 0.0 }"),
         Some("{ jitter_ms = 1.0, drift_ppm = 20.0, late_ms = 2.0, double_probability = 0.05 }"),
+    ),
+    (
+        "shadows of a sun at 35 degrees",
+        "scene.light",
+        Some("{ sun_azimuth_deg = 150.0, sun_elevation_deg = 35.0 }"),
+        Some("{ sun_azimuth_deg = 150.0, sun_elevation_deg = 35.0, shadows = true }"),
+    ),
+    (
+        "shadows of a sun at 14 degrees",
+        "scene.light",
+        Some("{ sun_azimuth_deg = 150.0, sun_elevation_deg = 14.0 }"),
+        Some("{ sun_azimuth_deg = 150.0, sun_elevation_deg = 14.0, shadows = true }"),
     ),
 ];
 

@@ -18,14 +18,16 @@ mod houses;
 mod passes;
 mod scenario;
 mod scenes;
+mod truth;
 
 use flight::{Outcome, comparison::Renderers};
 
 /// Prints a table; a single row with one frame unless the program measures.
 type Table = fn(&Renderers, bool) -> Outcome<()>;
 
-const TABLES: [(&str, Table); 11] = [
+const TABLES: [(&str, Table); 12] = [
     ("scenes", scenes::scenes),
+    ("truth", truth::truth),
     ("renderers", cameras::renderers),
     ("size", cameras::size),
     ("blur", cameras::blur),

@@ -16,6 +16,8 @@ use crate::flight::Outcome;
 pub const ALL_EFFECTS: &str = "benches/all_effects.toml";
 /// The terrain with 5000 houses.
 pub const HOUSES: &str = "benches/houses.toml";
+/// Stereo low over grass, houses and trees.
+pub const VIO_TOWN: &str = "benches/scenes/vio_town.toml";
 /// Frames of a scenario that are measured.
 pub const FRAMES: u64 = 96;
 

@@ -21,7 +21,7 @@ use crate::{
         with_paper_preset,
     },
     passes::{StageTimes, stage_times},
-    scenario::{ALL_EFFECTS, FRAMES, HOUSES, rig},
+    scenario::{ALL_EFFECTS, FRAMES, HOUSES, VIO_TOWN, rig},
 };
 
 const LIMITS: RoundLimits = RoundLimits { burst: 8, rounds: 5, budget: Duration::from_secs(60) };
@@ -33,7 +33,7 @@ const FILE_FRAMES: &str = "8..24";
 const SCENES: [(&str, &str); 7] = [
     ("alpine", ALL_EFFECTS),
     ("houses", HOUSES),
-    ("vio_town", "benches/scenes/vio_town.toml"),
+    ("vio_town", VIO_TOWN),
     ("mapping", "benches/scenes/mapping.toml"),
     ("fpv", "benches/scenes/fpv.toml"),
     ("fisheye", "benches/scenes/fisheye.toml"),

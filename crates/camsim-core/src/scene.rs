@@ -32,9 +32,9 @@ pub use mesh_lod::{LodTolerance, ModelLod, SceneLods, ShapeLod, ShapeLods};
 pub use motion::{RigidMotion, RigidState};
 pub use prefilter::{Prefilter, PrefilterTaps};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, DrawnCell, LodSelection, PlacedMesh, SunlitBlocks, Terrain, TerrainChunk,
-    TerrainDetail, TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainTiles, TerrainTriangle,
-    TerrainVertex, TerrainWalk, WalkHit,
+    Aabb, CHUNK_CELLS, DrawnCell, LodSelection, PlacedMesh, SunMap, Terrain, TerrainChunk, TerrainDetail,
+    TerrainError, TerrainGrid, TerrainHit, TerrainMesh, TerrainTiles, TerrainTriangle, TerrainVertex,
+    TerrainWalk, WalkHit,
 };
 pub use texture::{
     Encoding, LUMINANCE, LUMINANCE_F64, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb,

@@ -11,7 +11,7 @@ use camsim_core::{
     sequence::Sequence,
 };
 use common::{
-    barrel_lens, city, gpu_engine, pattern,
+    barrel_lens, both_engines, city, gpu_engine, pattern,
     rays::{assert_silhouettes_of_twin, black_ground_and_roof, expected, linear_psnr},
     render, render_at_phase, rolling, roof, scenario, sequence, steady,
 };
@@ -63,9 +63,11 @@ fn gathering_from_several_key_frames_agrees_with_its_twin() {
     let mut scene = pattern(400.0);
     scene.meshes.push(roof(60.0, 15.0));
     let sequence = sequence(scenario, trajectory, scene);
-    let done = render(&gpu_engine(), &sequence, &[Channel::Color], 0);
-    assert_eq!(done.plan.keys.len(), 3);
-    assert_silhouettes_of_twin(&sequence, &done);
+    for (_, engine) in both_engines() {
+        let done = render(&engine, &sequence, &[Channel::Color], 0);
+        assert_eq!(done.plan.keys.len(), 3);
+        assert_silhouettes_of_twin(&sequence, &done);
+    }
 }
 
 /// The paper's figs. 15, 17 and 19: there the board's far edge is lost and its border smears, because depth
@@ -74,10 +76,11 @@ fn gathering_from_several_key_frames_agrees_with_its_twin() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn board_edges_are_exact_with_several_key_frames() {
-    let engine = gpu_engine();
-    for (name, delay_ms, readout_ms, exposure_ms) in
-        [("delay", 1000.0, 0.0, 0.0), ("rolling shutter", 0.0, 1000.0, 0.0), ("all", 1000.0, 1000.0, 200.0)]
-    {
+    let cases =
+        [("delay", 1000.0, 0.0, 0.0), ("rolling shutter", 0.0, 1000.0, 0.0), ("all", 1000.0, 1000.0, 200.0)];
+    let engines = both_engines();
+    for (case, (who, engine)) in cases.iter().flat_map(|case| engines.iter().map(move |by| (case, by))) {
+        let (name, delay_ms, readout_ms, exposure_ms) = *case;
         let mut scenario = camera(-90.0);
         scenario.camera.shutter = ShutterSpec { delay_ms, readout_ms, exposure_ms, ..ShutterSpec::default() };
         scenario.quality.max_error_dn = 0.5;
@@ -87,7 +90,7 @@ fn board_edges_are_exact_with_several_key_frames() {
             steady(120.0, 0.0, DVec3::new(12.0, 10.0, 0.0), DVec3::ZERO),
             black_ground_and_roof(),
         );
-        let done = render(&engine, &sequence, &[Channel::Color], 0);
+        let done = render(engine, &sequence, &[Channel::Color], 0);
         let near = expected(&sequence, &done.plan);
         let errors: Vec<f64> = near
             .iter()
@@ -98,16 +101,16 @@ fn board_edges_are_exact_with_several_key_frames() {
         let found: f64 = near.iter().map(|&(i, _)| f64::from(done.frame.color_rgba()[4 * i])).sum();
         let psnr = linear_psnr(&done.frame, &near);
         eprintln!(
-            "{name}: {} keys, {psnr:.1} dB, worst coverage error {worst:.3}, area {found:.1} of {covered:.1} \
+            "{name}, {who}: {} keys, {psnr:.1} dB, worst coverage error {worst:.3}, area {found:.1} of {covered:.1} \
              px over {} px",
             done.plan.keys.len(),
             near.len()
         );
-        assert!(near.len() > 300, "{name}: {}", near.len());
+        assert!(near.len() > 300, "{name}, {who}: {}", near.len());
         // 16 samples a pixel: an edge is known to an eighth of a pixel.
         assert!(
             worst < 0.25 && (found / covered - 1.0).abs() < 0.01,
-            "{name}: {worst:.3}, {found:.1} {covered:.1}"
+            "{name}, {who}: {worst:.3}, {found:.1} {covered:.1}"
         );
     }
 }
@@ -142,14 +145,17 @@ const FLIGHTS: [(&str, Flight); 6] = [
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn sources_and_depths_over_buildings_are_exact() {
-    let engine = gpu_engine();
+    let engines = both_engines();
     let mut unseen = 0;
     for (name, flight) in &FLIGHTS[1..5] {
-        for (keys, phase) in [(Auto::Value(1), 0.0), (Auto::Auto, 0.5)] {
+        let cases = [(Auto::Value(1), 0.0), (Auto::Auto, 0.5)];
+        for ((keys, phase), (who, engine)) in
+            cases.into_iter().flat_map(|case| engines.iter().map(move |by| (case, by)))
+        {
             let mut sequence = (*flight.sequence(keys, 1.0)).clone();
             sequence.scenario.quality.max_error_px = 1e-3;
             let sequence = Arc::new(sequence);
-            let done = render_at_phase(&engine, &sequence, &ALL, 0, phase as f32);
+            let done = render_at_phase(engine, &sequence, &ALL, 0, phase as f32);
             let oracle = Oracle::new(sequence).expect("a usable camera");
             let errors =
                 coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1)
@@ -157,7 +163,7 @@ fn sources_and_depths_over_buildings_are_exact() {
             unseen += disocclusion(&oracle, done.plan.frame, &done.plan.key_poses(), &[phase]).hidden;
             let depth_off = worst_depth(&oracle, &done.frame);
             eprintln!(
-                "{name}: {} keys, rms {:.1e} px, at silhouettes {:.1e} px, max {:.1e} px, depth \
+                "{name}, {who}: {} keys, rms {:.1e} px, at silhouettes {:.1e} px, max {:.1e} px, depth \
                  {depth_off:.1e}",
                 done.plan.keys.len(),
                 errors.all.rms_px,
@@ -166,11 +172,11 @@ fn sources_and_depths_over_buildings_are_exact() {
             );
             assert!(
                 errors.silhouettes.count > 5000 && errors.falsely_valid == 0 && errors.missing == 0,
-                "{name}: {errors:?}"
+                "{name}, {who}: {errors:?}"
             );
             // No pixel is of the wrong surface: the parallax between surfaces is pixels, and depth changes by
             // tens of per cent.
-            assert!(errors.all.max_px <= 0.05 && depth_off < 0.01, "{name}: {depth_off} {errors:?}");
+            assert!(errors.all.max_px <= 0.05 && depth_off < 0.01, "{name}, {who}: {depth_off} {errors:?}");
         }
     }
     assert!(unseen > 100, "what no key frame sees is among them: {unseen}");
@@ -192,19 +198,21 @@ fn worst_depth(oracle: &Oracle, frame: &RenderedFrame) -> f64 {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn second_key_frame_fills_disocclusions() {
-    let engine = gpu_engine();
     let (name, flight) = &FLIGHTS[5];
     let oracle = Oracle::new(flight.sequence(Auto::Auto, 1.0)).expect("a usable camera");
     let truth =
         oracle.render(0, &RenderOptions { tolerance_dn: 1.0, max_samples: 128, ..RenderOptions::default() });
     let near = silhouettes(&oracle, 0, &[0.0]);
-    let [one, two] = [Auto::Value(1), Auto::Auto].map(|keys| {
-        let done = render(&engine, &flight.sequence(keys, 0.5), &[Channel::Color], 0);
-        let errors = image_errors(&truth, &done.frame, &near).expect("the same size");
-        eprintln!("{name}: {} keys, {:.1} dB at silhouettes", done.plan.keys.len(), errors.silhouettes_db);
-        errors.silhouettes_db
-    });
-    assert!(two > 39.0 && two > one + 3.0, "{one:.1} {two:.1} dB");
+    for (who, engine) in both_engines() {
+        let [one, two] = [Auto::Value(1), Auto::Auto].map(|keys| {
+            let done = render(&engine, &flight.sequence(keys, 0.5), &[Channel::Color], 0);
+            let errors = image_errors(&truth, &done.frame, &near).expect("the same size");
+            let (keys, db) = (done.plan.keys.len(), errors.silhouettes_db);
+            eprintln!("{name}, {who}: {keys} keys, {db:.1} dB at silhouettes");
+            db
+        });
+        assert!(two > 39.0 && two > one + 3.0, "{who}: {one:.1} {two:.1} dB");
+    }
 }
 
 #[test]

@@ -10,10 +10,10 @@ use camsim_core::{
     temporal::{edge_mask::edge_mask, supersampled::PixelCentre},
     trajectory::Trajectory,
 };
-use camsim_engine::Finished;
+use camsim_engine::{Engine, Finished};
 use camsim_plan::EdgeStage;
 use common::{
-    barrel_lens, gpu_engine, pattern,
+    barrel_lens, both_engines, gpu_engine, pattern,
     rays::{assert_silhouettes_of_twin, black_ground_and_roof, expected, linear_psnr},
     render, roof, scenario, sequence, steady,
 };
@@ -25,20 +25,26 @@ const EAST: DVec3 = DVec3::new(0.0, 40.0, 0.0);
 const TURN: DVec3 = DVec3::new(0.2, -0.3, 0.5);
 
 /// Compares with 36 and with 4 samples a pixel, and prints what one would give. PSNR against full scale 1.
-fn check(
+fn check(name: &str, scenario: &Scenario, trajectory: &Trajectory, scene: &Scene, at_least_db: [f64; 2]) {
+    for (who, engine) in both_engines() {
+        check_by(&engine, &format!("{name}, {who}"), scenario, trajectory, scene, at_least_db);
+    }
+}
+
+fn check_by(
+    engine: &Engine,
     name: &str,
     scenario: &Scenario,
     trajectory: &Trajectory,
     scene: &Scene,
     [at_least_db, four_at_least_db]: [f64; 2],
 ) {
-    let engine = gpu_engine();
     let made = |max_error_dn: f64, silhouettes: Silhouettes| {
         let mut scenario = scenario.clone();
         scenario.quality.max_error_dn = max_error_dn;
         scenario.quality.silhouettes = silhouettes;
         let sequence = sequence(scenario, trajectory.clone(), scene.clone());
-        (render(&engine, &sequence, &[Channel::Color], 0), sequence)
+        (render(engine, &sequence, &[Channel::Color], 0), sequence)
     };
     let (done, sequence) = made(0.5, Silhouettes::Rays);
     let expected = expected(&sequence, &done.plan);
@@ -83,8 +89,9 @@ fn silhouette_rays_agree_with_their_twin() {
     scenario.camera.shutter = rolling(15.0);
     scenario.quality.key_frames = Auto::Value(1);
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
-    let done = render(&gpu_engine(), &sequence, &[Channel::Color], 0);
-    assert_silhouettes_of_twin(&sequence, &done);
+    for (_, engine) in both_engines() {
+        assert_silhouettes_of_twin(&sequence, &render(&engine, &sequence, &[Channel::Color], 0));
+    }
 }
 
 #[test]
@@ -154,12 +161,12 @@ fn ridge_depths_belong_to_one_ridge() {
     scenario.camera.focal_px = [96.0, 96.0];
     scenario.camera.mount.angles_deg = [4.0, -12.0, 0.0];
     scenario.camera.shutter = rolling(10.0);
-    let engine = gpu_engine();
-    for (name, velocity, turn) in
-        [("still", DVec3::ZERO, DVec3::ZERO), ("turning", DVec3::ZERO, TURN), ("flying", EAST, TURN)]
-    {
+    let engines = both_engines();
+    let cases = [("still", DVec3::ZERO, DVec3::ZERO), ("turning", DVec3::ZERO, TURN), ("flying", EAST, TURN)];
+    for (case, (who, engine)) in cases.iter().flat_map(|case| engines.iter().map(move |by| (case, by))) {
+        let (name, velocity, turn) = *case;
         let sequence = sequence(scenario.clone(), steady(110.0, 0.0, velocity, turn), ridges());
-        let done = render(&engine, &sequence, &[Channel::Depth], 0);
+        let done = render(engine, &sequence, &[Channel::Depth], 0);
         let oracle = Oracle::new(sequence).expect("a usable camera");
         let view = oracle.view(0);
         let depths = done.frame.depth_m().expect("asked for");
@@ -170,9 +177,9 @@ fn ridge_depths_belong_to_one_ridge() {
             worst = worst.max((found - true_m).abs() / found.max(true_m).max(1e-9));
             sky += u32::from(hit.is_none());
         }
-        eprintln!("{name}: {:?}, depth off by {worst:.1e} at most", done.plan.temporal);
+        eprintln!("{name}, {who}: {:?}, depth off by {worst:.1e} at most", done.plan.temporal);
         // A step is more; a bend within a pixel less than the marks ask for.
-        assert!(worst < 0.01 && (1000..9000).contains(&sky), "{name}: {worst:.1e}, {sky} px of sky");
+        assert!(worst < 0.01 && (1000..9000).contains(&sky), "{name}, {who}: {worst:.1e}, {sky} px of sky");
     }
 }
 
@@ -357,7 +364,7 @@ fn tiny(size_px: [u32; 2], exposure_ms: f64, solver: Auto<Solver>) -> Scenario {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn single_pixel_frame_is_rendered() {
-    let engine = gpu_engine();
+    let engines = both_engines();
     let moving = (EAST, TURN);
     let forced = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| (Auto::Value(solver), moving));
     let still = DVec3::ZERO;
@@ -375,14 +382,16 @@ fn single_pixel_frame_is_rendered() {
             let mut scenario = tiny(size_px, exposure_ms, solver);
             scenario.quality.silhouettes = method;
             let sequence = sequence(scenario, steady(120.0, 0.0, velocity, rate), black_ground_and_roof());
-            let done = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
-            let alpha: Vec<f32> = done.frame.color_rgba().chunks_exact(4).map(|pixel| pixel[3]).collect();
-            assert_eq!(
-                alpha,
-                vec![1.0; (size_px[0] * size_px[1]) as usize],
-                "{size_px:?} {exposure_ms} ms {solver:?} {method:?} {velocity} {rate}"
-            );
-            listed += u32::from(done.plan.edges != EdgeStage::None);
+            for (who, engine) in &engines {
+                let done = render(engine, &sequence, &[Channel::Color, Channel::Depth], 0);
+                let alpha: Vec<f32> = done.frame.color_rgba().chunks_exact(4).map(|pixel| pixel[3]).collect();
+                assert_eq!(
+                    alpha,
+                    vec![1.0; (size_px[0] * size_px[1]) as usize],
+                    "{who} {size_px:?} {exposure_ms} ms {solver:?} {method:?} {velocity} {rate}"
+                );
+                listed += u32::from(done.plan.edges != EdgeStage::None);
+            }
         }
         assert!(listed > 0, "{size_px:?}: no plan lists pixels");
     }

@@ -26,7 +26,7 @@ mod packet;
 mod placed;
 mod query;
 mod select;
-mod sunlit;
+mod sun_map;
 mod terrain_tiles;
 #[cfg(test)]
 mod tests;
@@ -49,7 +49,7 @@ pub use query::SeenTriangle;
 pub use query::TerrainHit;
 pub use query::intersect_triangle;
 pub use select::{DrawnCell, LodSelection, TerrainMesh};
-pub use sunlit::SunlitBlocks;
+pub use sun_map::SunMap;
 pub use terrain_tiles::TerrainTiles;
 use tree::BlockTree;
 pub use walk::{TerrainTriangle, TerrainWalk, WalkHit};

@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 
 use camsim_core::{
     scenario::Preset,
-    scene::{Scene, SunlitBlocks, srgb_from_linear},
+    scene::{Scene, SunMap, srgb_from_linear},
     temporal::{SAMPLE_POSITIONS, edge_mask, resolve_depth},
 };
 use camsim_plan::{EdgeStage, FramePlan, KeyFrame, NEAR_M};
@@ -31,7 +31,7 @@ mod trace;
 use mips::MipChain;
 pub use moving::{Instant, MovingCaster, RayScratch};
 use shade::{KeyCamera, SurfaceShader};
-use shadow::{SeenLight, SurfaceSuns, fraction_of_sun};
+use shadow::{Met, SeenLight, SurfaceSuns, fraction_of_sun};
 use trace::{Hits, OpaqueHit, SceneRay, SceneTrees, Triangle, terrain_triangle};
 
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
@@ -50,8 +50,8 @@ pub struct CastScene {
     trees: SceneTrees,
     /// Of the terrain, then by mesh; surfaces of one texture have it in common. Made when first needed.
     textures: OnceLock<Vec<Arc<MipChain>>>,
-    /// Where the terrain leaves the sun; `None` without terrain or shadows.
-    sunlit: Option<SunlitBlocks>,
+    /// `None` without terrain or shadows.
+    sun_map: Option<SunMap>,
 }
 
 impl CastScene {
@@ -59,9 +59,9 @@ impl CastScene {
     #[must_use]
     pub fn new(scene: &Arc<Scene>) -> Self {
         let light = scene.light.filter(|light| light.shadows);
-        let sunlit = scene.terrain.as_ref().zip(light);
-        let sunlit = sunlit.map(|(terrain, light)| SunlitBlocks::new(terrain, light.to_sun_ned));
-        Self { scene: scene.clone(), trees: SceneTrees::new(scene), textures: OnceLock::new(), sunlit }
+        let sun_map = scene.terrain.as_ref().zip(light);
+        let sun_map = sun_map.map(|(terrain, light)| SunMap::new(terrain, light.to_sun_ned));
+        Self { scene: scene.clone(), trees: SceneTrees::new(scene), textures: OnceLock::new(), sun_map }
     }
 
     /// The mip levels of all textures. The first call makes them, on all threads: not from one of their tasks.
@@ -123,7 +123,7 @@ type SampleColors = [[f16; 3]; SAMPLES];
 #[derive(Debug)]
 struct FrameCaster<'a> {
     trees: &'a SceneTrees,
-    sunlit: Option<&'a SunlitBlocks>,
+    sun_map: Option<&'a SunMap>,
     shader: SurfaceShader<'a>,
 }
 
@@ -168,7 +168,7 @@ impl<'a> FrameCaster<'a> {
             posed: &[],
             shadows: scene.light.filter(|_| plan.shadows.is_some()),
         };
-        Self { trees: &cast.trees, sunlit: cast.sunlit.as_ref(), shader }
+        Self { trees: &cast.trees, sun_map: cast.sun_map.as_ref(), shader }
     }
 
     /// Linear R G B A and inverse depth at the centres of all pixels.
@@ -251,7 +251,7 @@ impl<'a> FrameCaster<'a> {
         let ray = self.shader.camera.ray(position_px);
         let (mut sum, mut left, mut seen) = (Vec3::ZERO, 1.0, SeenLight::default());
         let mut color = |triangle: &Triangle, t: f64| {
-            let sun = self.sun(triangle, t, &ray);
+            let sun = self.sun(&Met::new(*triangle, t), &ray);
             seen.add(triangle.surface, sun);
             self.shader.color(triangle, position_px, fraction_of_sun(triangle.surface, sun, suns))
         };
@@ -287,7 +287,7 @@ impl<'a> FrameCaster<'a> {
             opaque[k] = self.opaque_triangle(hits, &ray);
             let first = opaque[k].zip(hits.opaque).map(|(triangle, hit)| (triangle, hit.t()));
             for (triangle, t) in hits.blended.iter().map(|hit| (hit.triangle(), hit.t)).chain(first) {
-                let sun = self.sun(&triangle, t, &ray);
+                let sun = self.sun(&Met::new(triangle, t), &ray);
                 seen.add(triangle.surface, sun);
                 let sun = fraction_of_sun(triangle.surface, sun, suns);
                 match fractions.iter_mut().find(|fraction| fraction.triangle == triangle) {

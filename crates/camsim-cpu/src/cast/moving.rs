@@ -82,7 +82,7 @@ impl MovingCaster {
             posed: &instant.posed,
             shadows: scene.light.filter(|light| light.shadows),
         };
-        let caster = FrameCaster { trees: &self.cast.trees, sunlit: self.cast.sunlit.as_ref(), shader };
+        let caster = FrameCaster { trees: &self.cast.trees, sun_map: self.cast.sun_map.as_ref(), shader };
         caster.middle(uv / step_uv, &mut scratch.0, None).0
     }
 }

@@ -4,7 +4,7 @@
 //! by three pixels, a second one finds the fraction of each surface in a pixel that the sun shines on, by rays
 //! spread evenly over the pixel.
 
-use camsim_core::scene::Terrain;
+use camsim_core::scene::{Aabb, Mesh, Terrain};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -29,6 +29,23 @@ pub(super) enum Sun {
     Shining,
 }
 
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Met {
+    pub triangle: Triangle,
+    pub t: f64,
+    /// Unit normal on the side from which the ray comes, if it is known.
+    pub normal_ned: Option<DVec3>,
+    /// False where no model may keep the sun from it.
+    pub may_have_models: bool,
+}
+
+impl Met {
+    pub fn new(triangle: Triangle, t: f64) -> Self {
+        Self { triangle, t, normal_ned: None, may_have_models: true }
+    }
+}
+
 /// Whether light and shadow were seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SeenLight {
@@ -45,6 +62,11 @@ impl SeenLight {
     /// Whether both were.
     pub fn is_border(self) -> bool {
         self.light && self.shadow
+    }
+
+    /// That of a point in the sun.
+    pub fn of_open_ground() -> Self {
+        Self { light: true, shadow: false }
     }
 
     pub fn or(self, other: Self) -> Self {
@@ -98,45 +120,55 @@ fn has_sun(terrain: &Terrain, triangle: &Triangle) -> bool {
 
 impl FrameCaster<'_> {
     /// What a triangle has of the sun where a ray meets it.
-    pub(super) fn sun(&self, triangle: &Triangle, t: f64, ray: &SceneRay) -> Sun {
+    pub(super) fn sun(&self, met: &Met, ray: &SceneRay) -> Sun {
+        let Met { triangle, t, normal_ned, may_have_models } = met;
         let Some(light) = self.shader.shadows else { return Sun::NoMatter };
         let scene = self.shader.scene;
         let mesh = triangle.surface.checked_sub(1).map(|mesh| self.shader.mesh(mesh as usize));
-        let points: [DVec3; 3] = match (mesh, &scene.terrain) {
-            (Some(mesh), _) if mesh.shape.has_normals() => {
-                triangle.corners.map(|corner| mesh.position_ned_m(corner))
-            }
-            (None, Some(terrain)) if has_sun(terrain, triangle) => {
-                triangle.corners.map(|corner| terrain_position(terrain, triangle.chunk, corner))
-            }
-            _ => return Sun::NoMatter,
+        let is_lit = match (mesh, &scene.terrain) {
+            (Some(mesh), _) => mesh.shape.has_normals(),
+            (None, terrain) => terrain.as_ref().is_some_and(|terrain| has_sun(terrain, triangle)),
         };
-        let [a, b, c] = points;
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let normal = if normal.dot(ray.direction_ned) > 0.0 { -normal } else { normal };
+        if !is_lit {
+            return Sun::NoMatter;
+        }
+        let normal = normal_ned.unwrap_or_else(|| self.normal_towards(triangle, mesh, ray));
         if normal.dot(light.to_sun_ned) <= 0.0 {
             return Sun::Behind;
         }
         let origin_ned_m = ray.origin_ned_m + t * ray.direction_ned + LIFT_M * normal;
         let to_sun = SceneRay { origin_ned_m, direction_ned: light.to_sun_ned };
-        let is_blocked = scene.terrain.as_ref().is_some_and(|terrain| {
-            let is_open = mesh.is_none() && normal.z < 0.0 && self.is_sunlit(terrain, triangle);
-            !is_open && terrain.blocks(origin_ned_m, light.to_sun_ned)
+        let is_ground = mesh.is_none() && normal.z < 0.0;
+        let is_blocked = scene.terrain.as_ref().is_some_and(|terrain| match self.sun_map {
+            Some(sun_map) if is_ground => sun_map.hides(terrain, origin_ned_m),
+            _ => terrain.blocks(origin_ned_m, light.to_sun_ned),
         });
-        match is_blocked || self.trees.is_blocked(scene, self.shader.posed, &to_sun) {
+        match is_blocked || (*may_have_models && self.trees.is_blocked(scene, self.shader.posed, &to_sun)) {
             true => Sun::Hidden,
             false => Sun::Shining,
         }
     }
 
-    /// Whether the terrain is known to leave the sun on all of the block around one of its triangles.
-    fn is_sunlit(&self, terrain: &Terrain, triangle: &Triangle) -> bool {
-        let chunk = &terrain.chunks[triangle.chunk as usize];
-        // The first corner is the north-western one of both triangles of a cell.
-        let first = triangle.corners[0] - chunk.first_vertex;
-        let across = chunk.cells[0] + 1;
-        let cell = [first % across, first / across];
-        self.sunlit.is_some_and(|sunlit| sunlit.is_lit(terrain, triangle.chunk, cell))
+    /// Unit normal of a triangle, on the side from which a ray comes.
+    fn normal_towards(&self, triangle: &Triangle, mesh: Option<&Mesh>, ray: &SceneRay) -> DVec3 {
+        let corner = |corner: u32| match (mesh, &self.shader.scene.terrain) {
+            (Some(mesh), _) => mesh.position_ned_m(corner),
+            (None, Some(terrain)) => terrain_position(terrain, triangle.chunk, corner),
+            (None, None) => DVec3::NAN,
+        };
+        let [a, b, c] = triangle.corners.map(corner);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        if normal.dot(ray.direction_ned) > 0.0 { -normal } else { normal }
+    }
+
+    /// Whether the terrain leaves the sun on all of itself in a box, and whether no model is in the box or may keep
+    /// the sun from it. False says nothing.
+    pub(super) fn is_open(&self, bounds: &Aabb) -> [bool; 2] {
+        let Some((sun_map, terrain)) = self.sun_map.zip(self.shader.scene.terrain.as_ref()) else {
+            return [false; 2];
+        };
+        let has_models = self.trees.any_model(|model| sun_map.may_shade(model, bounds));
+        [sun_map.is_lit_within(terrain, bounds), !has_models]
     }
 
     /// Values of all pixels by their middles. Those at borders of shadows are made again, with the fractions of
@@ -175,7 +207,7 @@ impl FrameCaster<'_> {
             let opaque = self.opaque_triangle(hits, &ray).zip(hits.opaque);
             let opaque = opaque.map(|(triangle, hit)| (triangle, hit.t()));
             for (triangle, t) in hits.blended.iter().map(|hit| (hit.triangle(), hit.t)).chain(opaque) {
-                suns.add(triangle.surface, self.sun(&triangle, t, &ray));
+                suns.add(triangle.surface, self.sun(&Met::new(triangle, t), &ray));
             }
         }
         suns

@@ -152,6 +152,18 @@ impl SceneTrees {
         hit.map(|(t, hit)| (t + t_min, hit.triangle()))
     }
 
+    /// Ray parameter where a ray meets a triangle of a model.
+    pub fn meet_triangle(&self, scene: &Scene, triangle: &Triangle, ray: &SceneRay) -> Option<f64> {
+        let mesh = &scene.meshes[triangle.surface.checked_sub(1)? as usize];
+        let points = triangle.corners.map(|corner| mesh.position_ned_m(corner));
+        intersect_triangle(points, ray.origin_ned_m, ray.direction_ned, f64::INFINITY).map(|(t, _)| t)
+    }
+
+    /// Whether the box of a model that stands still is accepted, as are those around it.
+    pub fn any_model(&self, accept: impl Fn(&Aabb) -> bool) -> bool {
+        !self.meshes.items_in(accept).is_empty()
+    }
+
     /// Whether a ray meets a model that has depth, whichever side of it. Meshes of `posed` are where they are
     /// there, and not in the scene.
     pub fn is_blocked(&self, scene: &Scene, posed: &[PosedMesh], ray: &SceneRay) -> bool {

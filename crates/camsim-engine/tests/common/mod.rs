@@ -26,6 +26,11 @@ pub fn gpu_engine() -> Engine {
     engine
 }
 
+/// The gpu and the cpu renderer, each for all passes.
+pub fn both_engines() -> [(&'static str, Engine); 2] {
+    [("gpu", gpu_engine()), ("cpu", Engine::cpu())]
+}
+
 /// Whether textures are read and triangles drawn by code. Circuits weigh texels with 8 bits of fraction, and
 /// move corners to multiples of 1/256 px.
 pub fn is_software(engine: &Engine) -> bool {

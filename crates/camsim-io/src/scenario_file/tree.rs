@@ -188,14 +188,17 @@ impl Tree {
         if key.is_empty() || key.split('.').any(str::is_empty) {
             return Err(fail("the key is empty; write --set camera.fps=25".into()));
         }
-        let key = self.numbered(key).map_err(fail)?;
-        if text == UNSET {
-            return self.unset(&key, fail);
-        }
-        if let Some(advice) = unparsed_backslashes(text) {
+        if let Some(advice) = unparsed_backslashes(text).filter(|_| text != UNSET) {
             return Err(fail(advice));
         }
-        self.put(&key, value(text), &KeyLocation::Set(shown.clone()), fail)
+        for key in self.of_each_camera(key) {
+            let key = self.numbered(&key).map_err(fail)?;
+            match text {
+                UNSET => self.unset(&key, fail)?,
+                _ => self.put(&key, value(text), &KeyLocation::Set(shown.clone()), fail)?,
+            }
+        }
+        Ok(())
     }
 
     /// Takes a key out, if it is there.

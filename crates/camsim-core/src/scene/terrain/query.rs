@@ -175,7 +175,7 @@ impl Terrain {
     ) -> Option<TerrainHit> {
         let mut best: Option<TerrainHit> = None;
         for half in 0..2 {
-            let points = self.corners_ned_m(chunk_index, cell, half);
+            let points = self.cell_corners_ned_m(chunk_index, cell, half);
             let limit = best.map_or(t_max, |hit| hit.t);
             let hit = intersect_triangle(points, origin, direction, limit);
             best = hit.map(|(t, weights)| self.hit([chunk_index, half], cell, points, t, weights)).or(best);
@@ -184,8 +184,14 @@ impl Terrain {
     }
 
     /// Corners of a triangle of a cell, NED, metres; not finite where one is a void.
-    fn corners_ned_m(&self, chunk: u32, cell: [u32; 2], half: u32) -> [DVec3; 3] {
+    fn cell_corners_ned_m(&self, chunk: u32, cell: [u32; 2], half: u32) -> [DVec3; 3] {
         cell_triangles(cell)[half as usize].map(|[i, j]| self.position_ned_m(chunk, i, j))
+    }
+
+    /// Corners of a triangle, NED, metres; not finite where one is a void.
+    pub(super) fn corners_ned_m(&self, triangle: TerrainTriangle) -> [DVec3; 3] {
+        let (chunk, cell) = self.chunk_of_cell(triangle.cell);
+        self.cell_corners_ned_m(chunk, cell, triangle.half)
     }
 
     /// The hit of a ray on a triangle with these corners.
@@ -210,7 +216,7 @@ impl Terrain {
     #[must_use]
     pub fn hit_on(&self, triangle: TerrainTriangle, t: f64, weights: [f64; 3]) -> TerrainHit {
         let (chunk, cell) = self.chunk_of_cell(triangle.cell);
-        let points = self.corners_ned_m(chunk, cell, triangle.half);
+        let points = self.cell_corners_ned_m(chunk, cell, triangle.half);
         self.hit([chunk, triangle.half], cell, points, t, weights)
     }
 
@@ -221,31 +227,46 @@ impl Terrain {
         frustum: &Frustum,
         most_blocks: usize,
     ) -> Option<Vec<(TerrainTriangle, [DVec3; 3])>> {
+        let blocks = self.blocks_within(|bounds| frustum.may_see(bounds), most_blocks)?;
+        let triangles = blocks.into_iter().flat_map(|block| self.triangles_of(block));
+        Some(triangles.filter(|(_, corners)| frustum.may_see_triangle(*corners)).collect())
+    }
+
+    /// Triangles of the full surface, with their corners, from blocks whose boxes are accepted, as are those
+    /// around them.
+    pub(super) fn triangles_within(
+        &self,
+        accept: impl Fn(&super::Aabb) -> bool,
+    ) -> impl Iterator<Item = (TerrainTriangle, [DVec3; 3])> {
+        let blocks = self.blocks_within(accept, usize::MAX).unwrap_or_default();
+        let triangles = blocks.into_iter().flat_map(|block| self.triangles_of(block));
+        triangles.filter(|(_, corners)| corners.iter().all(|corner| corner.is_finite()))
+    }
+
+    /// Blocks of 4x4 cells whose boxes are accepted, as are those around them; `None` of more than `most`.
+    fn blocks_within(&self, accept: impl Fn(&super::Aabb) -> bool, most: usize) -> Option<Vec<[u32; 2]>> {
         let mut blocks = Vec::new();
         let mut stack = vec![self.tree.root()];
-        while let Some(node) = stack.pop().filter(|_| blocks.len() <= most_blocks) {
-            if frustum.may_see(&self.tree.bounds(node)) {
+        while let Some(node) = stack.pop().filter(|_| blocks.len() <= most) {
+            let bounds = self.tree.bounds(node);
+            if !bounds.is_empty() && accept(&bounds) {
                 if node.level == 0 {
                     blocks.push(node.at);
                 }
                 stack.extend(self.tree.children(node));
             }
         }
-        let of_block = |block: [u32; 2]| {
-            let [columns, rows] = [0, 1].map(|k| {
-                let first = block[k] * BLOCK_CELLS;
-                first..self.cells[k].min(first + BLOCK_CELLS)
-            });
-            let cells = rows.flat_map(move |row| columns.clone().map(move |column| [column, row]));
-            cells.flat_map(|cell| [0, 1].map(|half| TerrainTriangle { cell, half }))
-        };
-        let seen = |triangle: TerrainTriangle| {
-            let (chunk, cell) = self.chunk_of_cell(triangle.cell);
-            let corners = self.corners_ned_m(chunk, cell, triangle.half);
-            frustum.may_see_triangle(corners).then_some((triangle, corners))
-        };
-        (blocks.len() <= most_blocks)
-            .then(|| blocks.into_iter().flat_map(of_block).filter_map(seen).collect())
+        (blocks.len() <= most).then_some(blocks)
+    }
+
+    fn triangles_of(&self, block: [u32; 2]) -> impl Iterator<Item = (TerrainTriangle, [DVec3; 3])> {
+        let [columns, rows] = [0, 1].map(|k| {
+            let first = block[k] * BLOCK_CELLS;
+            first..self.cells[k].min(first + BLOCK_CELLS)
+        });
+        let cells = rows.flat_map(move |row| columns.clone().map(move |column| [column, row]));
+        let triangles = cells.flat_map(|cell| [0, 1].map(|half| TerrainTriangle { cell, half }));
+        triangles.map(|triangle| (triangle, self.corners_ned_m(triangle)))
     }
 }
 

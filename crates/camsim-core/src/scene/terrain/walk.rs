@@ -132,6 +132,12 @@ impl<'a> TerrainWalk<'a> {
         walk
     }
 
+    /// Where the walk is.
+    #[must_use]
+    pub fn triangle(&self) -> TerrainTriangle {
+        self.triangle
+    }
+
     /// Walks on to the triangle that `origin + t direction` hits, across triangles that face the origin. `None`
     /// if the path leads to a triangle that faces away, to a void or off the terrain, or is long; the walk is
     /// then anywhere on the path. The hit is on the same unfolded patch as the start, which need not be the

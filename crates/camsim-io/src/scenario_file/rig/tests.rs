@@ -74,6 +74,8 @@ fn keys_of_cameras_are_set_by_name_and_by_number() {
     let rig = parse(PAIR, &sets).unwrap();
     assert_eq!(camera(&rig, 1).shutter.readout_ms, 3.0);
     assert_eq!((camera(&rig, 0).name.as_str(), camera(&rig, 0).fps), ("port", 9.0));
+    let rig = parse(PAIR, &[("cameras.*.fps", "7")]).unwrap();
+    assert_eq!([0, 1].map(|number| camera(&rig, number).fps), [7.0; 2]);
     for (cameras, key, value, wanted) in [
         (PAIR, "cameras.middle.fps", "3", "there is no camera `middle`; the cameras are left, right"),
         (PAIR, "cameras.2.fps", "3", "there is no camera `2`; the cameras are left, right"),
@@ -88,7 +90,9 @@ fn keys_of_cameras_are_set_by_name_and_by_number() {
             "-1",
             "--set cameras.left.fps=-1: cameras.0.fps: must be a finite number above 0",
         ),
+        (PAIR, "cameras.*.fsp", "3", "did you mean `cameras.fps`?"),
         ("", "cameras.left.fps", "3", "has one camera, [camera]: write camera.fps"),
+        ("", "cameras.*.fps", "3", "has one camera, [camera]: write camera.fps"),
     ] {
         let error = parse(cameras, &[(key, value)]).unwrap_err().to_string();
         assert!(error.contains(wanted), "{key}: {error}");

@@ -102,6 +102,16 @@ impl Tree {
         Err(ScenarioError::Problems(vec![format!("{}: {CAMERAS}: {problem}", self.location(CAMERAS))]))
     }
 
+    /// A key of `--set` once for each camera where it has `*` for one.
+    pub(super) fn of_each_camera(&self, key: &str) -> Vec<String> {
+        match key.strip_prefix(CAMERAS).and_then(|rest| rest.strip_prefix(".*.")) {
+            Some(rest) if !self.entries().is_empty() => {
+                (0..self.entries().len()).map(|index| format!("{CAMERAS}.{index}.{rest}")).collect()
+            }
+            _ => vec![key.to_owned()],
+        }
+    }
+
     /// A key of `--set` with the number of a camera instead of its name.
     pub(super) fn with_camera_number(&self, key: &str) -> Result<String, String> {
         let mut steps = key.splitn(3, '.');
