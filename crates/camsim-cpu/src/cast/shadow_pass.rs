@@ -54,14 +54,7 @@ impl CastScene {
         let mut caster = FrameCaster::without_textures(self, plan, key, 1);
         let [width, height] = plan.ideal.size_px.map(|side| side as usize);
         let RasterFrame { color, depth, stride, .. } = frame;
-        let mut middles = vec![Middle::default(); width * height];
-        let drawn = Drawn { depth: &*depth, stride: *stride, size_px: [width, height] };
-        middles.par_chunks_mut(SQUARE * width).enumerate().for_each_init(Hits::default, |hits, (y, rows)| {
-            let mut search = Search::default();
-            for x in (0..width).step_by(SQUARE) {
-                caster.square([x, SQUARE * y], &drawn, rows, &mut search, hits);
-            }
-        });
+        let middles = caster.middles(&Drawn { depth, stride: *stride, size_px: [width, height] });
         let has_samples = plan.samples_a_pixel > 1;
         let shows_several =
             !self.scene.meshes.is_empty() || middles.iter().any(|middle| middle.surface.is_none());
@@ -182,6 +175,18 @@ impl Drawn<'_> {
 }
 
 impl<'a> FrameCaster<'a> {
+    fn middles(&self, drawn: &Drawn) -> Vec<Middle> {
+        let [width, height] = drawn.size_px;
+        let mut middles = vec![Middle::default(); width * height];
+        middles.par_chunks_mut(SQUARE * width).enumerate().for_each_init(Hits::default, |hits, (y, rows)| {
+            let mut search = Search::default();
+            for x in (0..width).step_by(SQUARE) {
+                self.square([x, SQUARE * y], drawn, rows, &mut search, hits);
+            }
+        });
+        middles
+    }
+
     /// Middles of the square with this first pixel. `rows` are those of the squares beside it too.
     fn square(
         &self,
@@ -313,3 +318,6 @@ impl<'a> FrameCaster<'a> {
         Some(Met::new(triangle, hit.t()))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,10 +12,10 @@ use std::sync::Arc;
 use camsim_core::{
     reference::{Oracle, RenderOptions},
     scenario::{Channel, MountSpec, Scenario},
-    scene::{Encoding, Light, Mesh, MeshVertex, Shape, Terrain, Texture, Wrap},
+    scene::{Encoding, Light, Terrain, Texture},
     sequence::Sequence,
 };
-use common::scenario;
+use common::{block, scenario};
 use glam::DVec3;
 
 const SUN: f64 = 0.7;
@@ -28,30 +28,6 @@ fn light() -> Light {
 
 fn paint(byte: u8) -> Arc<Texture> {
     Arc::new(Texture::uniform([byte, byte, byte, 255], Encoding::Linear))
-}
-
-/// A lit box with its floor's middle at `at`, as half its sides and its height.
-fn block(at: DVec3, half_m: [f64; 2], height_m: f64, byte: u8) -> Mesh {
-    let mut shape = Shape::default();
-    let mut face = |normal: DVec3, right: DVec3, up: DVec3| {
-        let base = shape.vertices.len() as u32;
-        let size = DVec3::new(half_m[0], half_m[1], 0.5 * height_m);
-        for (r, u) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-            let position = (normal + r * right + u * up) * size;
-            shape.vertices.push(MeshVertex::new(position.as_vec3().to_array(), [0.5; 2]));
-            shape.normals.push(normal.as_vec3().to_array());
-        }
-        shape.indices.extend([0, 1, 2, 0, 2, 3].map(|k: u32| base + k));
-    };
-    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        let (right, up) = axis.any_orthonormal_pair();
-        face(axis, right, up);
-        face(-axis, up, right);
-    }
-    let mut mesh =
-        Mesh::new(shape.vertices, shape.indices, paint(byte), at - DVec3::Z * 0.5 * height_m, Wrap::Clamp);
-    Arc::make_mut(&mut mesh.shape).normals = shape.normals;
-    mesh
 }
 
 /// Level ground of 128 m with heights of 2 m, and light on it.
