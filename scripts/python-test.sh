@@ -30,6 +30,6 @@ esac
 cp -f "$target/debug/$library" python/camsim/_camsim.abi3.so
 
 say "Python package: types"
-"$venv/bin/mypy" --strict python/camsim examples/python/*.py
+"$venv/bin/mypy" --strict python/camsim examples/python/*.py examples/tutorial/*.py
 say "Python package: tests"
 PYTHONPATH=$PWD/python CAMSIM_PROGRAM=$target/debug/camsim "$venv/bin/pytest" -q python/tests
