@@ -20,7 +20,7 @@ if "XDG_RUNTIME_DIR" not in _os.environ:
 
 from . import _camsim
 from ._errors import AdapterError, Error, InputError, RunError, ScenarioWarning
-from .frame import Frame, Rows, Source
+from .frame import Frame, Pose, Rows, Source
 from .frames import Frames
 from .inputs import HeightMap, PoseTable
 from .keys import Keys
@@ -79,6 +79,7 @@ __all__ = [
     "Plus",
     "MagnetometerSamples",
     "PoseTable",
+    "Pose",
     "Poses",
     "Rows",
     "RunError",

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import tempfile
+import webbrowser
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,6 +47,32 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
+class Pose:
+    """Pose of a camera.
+
+    >>> ned_from_camera = frame.pose.matrix
+    """
+
+    position_ned_m: NDArray[np.float64]
+    """Optical centre: north, east, down, metres; shape (3,)."""
+    ned_from_camera_wxyz: NDArray[np.float64]
+    """Unit quaternion that takes optical camera axes to NED, scalar first; shape (4,)."""
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """The same as a matrix that takes points from the camera's axes to NED, metres; shape (4, 4)."""
+        w, x, y, z = self.ned_from_camera_wxyz
+        matrix = np.eye(4)
+        matrix[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        matrix[:3, 3] = self.position_ned_m
+        return matrix
+
+
+@dataclass(frozen=True, eq=False)
 class Source:
     """The pinhole camera whose pixels `x` and `y` of `coords` are (`ideal_*` in `frames.csv`)."""
 
@@ -74,7 +104,7 @@ class Frame(Channels, Mapping[str, NDArray[Any]]):
     ['color', 'depth']
     """
 
-    __slots__ = ("_arrays", "_encoding", "camera", "index", "rows", "size_px", "source", "stamp_ns", "twins")
+    __slots__ = ("_arrays", "_encoding", "camera", "index", "pose", "rows", "size_px", "source", "stamp_ns", "twins")
 
     index: int
     """Number of the frame, from 0."""
@@ -84,6 +114,8 @@ class Frame(Channels, Mapping[str, NDArray[Any]]):
     """Stamp, nanoseconds on the clock of `output.stamps`."""
     size_px: tuple[int, int]
     """Width, height."""
+    pose: Pose
+    """Pose of the camera when the frame was taken, as in `frames.csv`: of a rolling shutter at the middle row."""
     rows: Rows
     """Time, pose and velocity of each row."""
     source: Source
@@ -96,6 +128,7 @@ class Frame(Channels, Mapping[str, NDArray[Any]]):
         self.camera = camera
         self.stamp_ns = parts["stamp_ns"]
         self.size_px = parts["size_px"]
+        self.pose = Pose(**parts["pose"])
         self.rows = Rows(**parts["rows"])
         self.source = Source(**parts["source"])
         self._arrays: dict[str, NDArray[Any]] = parts["channels"]
@@ -142,6 +175,33 @@ class Frame(Channels, Mapping[str, NDArray[Any]]):
         held = ", ".join(self._arrays) or "none"
         raise AttributeError(f"the frame has no channel {channel!r}: ask for it by channels=[...]; it has {held}")
 
+    def to_srgb8(self) -> NDArray[np.uint8]:
+        """The picture in 8 bits of sRGB, as photographs and networks have it: uint8, height x width x 3.
+
+        >>> frame.to_srgb8().shape
+        (480, 640, 3)
+        """
+        return _camsim.srgb8(self.color)
+
+    def show(self) -> None:
+        """Shows the picture: in a notebook below the cell, else by the program that the system has for PNG files."""
+        notebook = _notebook()
+        if notebook is not None:
+            notebook.display.display(self)
+            return
+        path = Path(tempfile.mkdtemp(prefix="camsim-")) / f"frame-{self.index}.png"
+        self.save(path, "srgb8")
+        webbrowser.open(path.as_uri())
+
+    def _repr_png_(self) -> bytes | None:
+        """The picture, for notebooks."""
+        if "color" not in self._arrays:
+            return None
+        with tempfile.TemporaryDirectory(prefix="camsim-") as folder:
+            path = Path(folder) / "frame.png"
+            self.save(path, "srgb8")
+            return path.read_bytes()
+
     def save(self, path: str | os.PathLike[str], encoding: str | None = None) -> None:
         """Writes the picture: `.png` in an encoding of `camera.photometric.output` (the scenario's by default),
         `.exr` with linear 32-bit floats. Folders of the path that do not exist are made.
@@ -153,3 +213,12 @@ class Frame(Channels, Mapping[str, NDArray[Any]]):
         if not os.fspath(path).lower().endswith((".png", ".exr")):
             raise InputError(f"cannot write {os.fspath(path)}: pictures are .png or .exr")
         _camsim.write_picture(path, self.color, encoding or self._encoding)
+
+
+def _notebook() -> Any:
+    """IPython, where it runs this code."""
+    try:
+        ipython = importlib.import_module("IPython")
+    except ImportError:
+        return None
+    return ipython if ipython.get_ipython() is not None else None

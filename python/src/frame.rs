@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use camsim::{
     core::{
         frame::{PlaneValues, RenderedFrame},
-        pose::wxyz,
+        pose::{CameraPose, wxyz},
         scenario::{Channel, OutputEncoding, PlaneKind},
+        sequence::Sequence,
     },
     engine::Finished,
     io::write::{self, SourceFrame},
@@ -23,24 +24,27 @@ use crate::{
 #[derive(Debug)]
 pub struct Delivery {
     pub frame: RenderedFrame,
+    /// Of the camera at the frame's stamp.
+    pub pose: CameraPose,
     pub source: SourceFrame,
 }
 
 impl Delivery {
-    /// A frame of a sequence whose stamps begin at `epoch_ns`.
-    pub fn new(finished: Finished, epoch_ns: i64) -> Self {
+    /// A frame of a sequence.
+    pub fn new(finished: Finished, sequence: &Sequence) -> Self {
         let plan = &finished.plan;
-        let source = SourceFrame::new(plan.ideal_view(), plan.key_s, epoch_ns);
-        Self { frame: finished.frame, source }
+        let source = SourceFrame::new(plan.ideal_view(), plan.key_s, sequence.epoch_ns);
+        Self { frame: finished.frame, pose: sequence.path.pose(plan.stamp_s), source }
     }
 
-    /// The frame as a dictionary: `index`, `stamp_ns`, `rows`, `source`, and `channels` with an array each.
+    /// The frame as a dictionary: `index`, `stamp_ns`, `pose`, `rows`, `source`, and `channels` with an array each.
     pub fn into_dict<'py>(self, py: Python<'py>, channels: &[Channel]) -> PyResult<Bound<'py, PyDict>> {
-        let Self { frame, source } = self;
+        let Self { frame, pose, source } = self;
         let parts = PyDict::new(py);
         parts.set_item("index", frame.index)?;
         parts.set_item("stamp_ns", frame.stamp_ns)?;
         parts.set_item("size_px", (frame.size_px[0], frame.size_px[1]))?;
+        parts.set_item("pose", pose_dict(py, &pose)?)?;
         parts.set_item("rows", columns(py, &frame.rows)?)?;
         parts.set_item("source", source_dict(py, &source)?)?;
         parts.set_item("channels", arrays(py, frame, channels)?)?;
@@ -48,14 +52,19 @@ impl Delivery {
     }
 }
 
-fn source_dict<'py>(py: Python<'py>, source: &SourceFrame) -> PyResult<Bound<'py, PyDict>> {
+fn pose_dict<'py>(py: Python<'py>, pose: &CameraPose) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
+    dict.set_item("position_ned_m", PyArray1::from_slice(py, &pose.position_ned_m.to_array()))?;
+    dict.set_item("ned_from_camera_wxyz", PyArray1::from_slice(py, &wxyz(pose.ned_from_camera)))?;
+    Ok(dict)
+}
+
+fn source_dict<'py>(py: Python<'py>, source: &SourceFrame) -> PyResult<Bound<'py, PyDict>> {
+    let dict = pose_dict(py, &source.pose)?;
     dict.set_item("size_px", (source.size_px[0], source.size_px[1]))?;
     dict.set_item("focal_px", (source.focal_px[0], source.focal_px[1]))?;
     dict.set_item("principal_px", (source.principal_px[0], source.principal_px[1]))?;
     dict.set_item("t_ns", source.t_ns)?;
-    dict.set_item("position_ned_m", PyArray1::from_slice(py, &source.pose.position_ned_m.to_array()))?;
-    dict.set_item("ned_from_camera_wxyz", PyArray1::from_slice(py, &wxyz(source.pose.ned_from_camera)))?;
     Ok(dict)
 }
 
@@ -122,6 +131,15 @@ pub fn write_picture(
     let frame = frame_of(&color)?;
     let encoding = self::encoding(encoding)?;
     py.detach(|| write::write_picture(&path, &frame, encoding)).or_run_error()
+}
+
+/// The nearest 8-bit sRGB codes of a linear colour picture, height x width x 3.
+#[pyfunction]
+pub fn srgb8<'py>(py: Python<'py>, color: PyReadonlyArray3<'py, f32>) -> PyResult<Bound<'py, PyAny>> {
+    let frame = frame_of(&color)?;
+    let rgb = |rgba: &[f32]| [0, 1, 2].map(|k: usize| write::srgb8(rgba[k]));
+    let codes = py.detach(|| frame.color_rgba().chunks_exact(4).flat_map(rgb).collect());
+    image(py, codes, [color.shape()[0], color.shape()[1]])
 }
 
 fn encoding(name: &str) -> PyResult<OutputEncoding> {

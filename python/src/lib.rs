@@ -41,7 +41,7 @@ mod _camsim {
         apply::apply,
         camera::Camera,
         command::run_main,
-        frame::write_picture,
+        frame::{srgb8, write_picture},
         lens::Lens,
         pictures::{board_of_file, board_of_keys, compare, compare_files},
         scenario::{Scenario, default_scenario, unpack_demo},

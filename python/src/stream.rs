@@ -140,11 +140,11 @@ fn render(
     frames: &FrameNumbers,
     sender: &SyncSender<Result<Delivery, Failure>>,
 ) -> Result<(), Failure> {
-    let epoch_ns = key.sequence.epoch_ns;
+    let sequence = &key.sequence;
     pool.with_opened(key, |opened| {
         opened.render(frames.iter(), &mut |finished| {
             let is_wanted =
-                !ENDS.load(Ordering::SeqCst) && sender.send(Ok(Delivery::new(finished, epoch_ns))).is_ok();
+                !ENDS.load(Ordering::SeqCst) && sender.send(Ok(Delivery::new(finished, sequence))).is_ok();
             if is_wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         })
     })?
@@ -153,11 +153,11 @@ fn render(
 /// Renders one frame on this thread.
 pub fn render_one(pool: &SessionPool, key: &SessionKey, frame: u64) -> PyResult<Delivery> {
     let _counted = Rendering::begin();
-    let epoch_ns = key.sequence.epoch_ns;
+    let sequence = &key.sequence;
     let mut made = None;
     let rendered = pool.with_opened(key, |opened| {
         opened.render([frame].into_iter(), &mut |finished| {
-            made = Some(Delivery::new(finished, epoch_ns));
+            made = Some(Delivery::new(finished, sequence));
             ControlFlow::Continue(())
         })
     });

@@ -20,6 +20,28 @@ import pytest
 
 import camsim
 from conftest import PROGRAM, ROOT, SMALL, run_program, set_words
+from readers import read_png
+
+
+def test_a_frame_has_a_pose_and_a_picture_in_srgb(pattern: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    scenario = camsim.Scenario.load(pattern, sets=SMALL)
+    frame = scenario.render(4, ["color"])
+    rows = frame.rows
+    middle = len(rows) // 2
+    # The stamp is that of the middle of the picture, between two rows.
+    for mine, above, below in zip(
+        frame.pose.position_ned_m, rows.position_ned_m[middle - 1], rows.position_ned_m[middle], strict=True
+    ):
+        assert min(above, below) - 1e-9 <= mine <= max(above, below) + 1e-9
+    matrix = frame.pose.matrix
+    assert matrix.shape == (4, 4) and np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.allclose(matrix[:3, 3], frame.pose.position_ned_m)
+    frame.save(tmp_path / "x.png", "srgb8")
+    written = read_png(tmp_path / "x.png")
+    assert frame.to_srgb8().dtype == np.uint8 and np.array_equal(frame.to_srgb8(), written[..., :3])
+    shown = frame._repr_png_()
+    assert shown is not None and shown[:8] == b"\x89PNG\r\n\x1a\n"
+    assert scenario.render(4, ["depth"])._repr_png_() is None
 
 
 def test_a_scenario_is_a_sequence_of_frames(pattern: pathlib.Path) -> None:
