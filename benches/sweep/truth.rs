@@ -32,7 +32,8 @@ pub fn truth(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
             table.add(names.join(", "), &camera, channels, false)?;
         }
         // A raw picture needs a sensor.
-        let all: Vec<Channel> = Channel::ALL.into_iter().filter(|channel| *channel != Channel::Raw).collect();
+        let all: Vec<Channel> =
+            Channel::ALL.iter().copied().filter(|channel| *channel != Channel::Raw).collect();
         table.add("all channels", &camera, &all, false)?;
         table.measure(camera.frames.min(FRAMES), limits)?;
         println!("\n{path}");

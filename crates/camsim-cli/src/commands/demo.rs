@@ -141,9 +141,12 @@ pub fn run(args: &DemoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     console.line(format_args!("  camsim explain {}", scene.display()))?;
     console
         .line(format_args!("  camsim render {} -o all --set camera.shutter.readout_ms=0", scene.display()))?;
-    if cfg!(feature = "viewer") {
-        console.line(format_args!("  camsim viewer {}", scene.display()))?;
-    }
+    let how = if cfg!(feature = "viewer") {
+        ""
+    } else {
+        "   after `cargo build --release`: this build has no window"
+    };
+    console.line(format_args!("  camsim viewer {}{how}", scene.display()))?;
     Ok(())
 }
 
