@@ -58,7 +58,7 @@ Exit codes:
 
 /// Simulator of imperfect airborne cameras: frames with ground truth.
 #[derive(Debug, Parser)]
-#[command(name = "camsim", version, after_help = AFTER_HELP)]
+#[command(name = "camsim", version = version(), after_help = AFTER_HELP)]
 #[command(arg_required_else_help = true, max_term_width = 110)]
 struct Cli {
     /// Print results only: no progress, notes or warnings
@@ -69,6 +69,22 @@ struct Cli {
     verbose: bool,
     #[command(subcommand)]
     command: Command,
+}
+
+/// Version, revision where it is known, and features.
+pub(crate) fn version() -> String {
+    let features = [
+        ("gpu", cfg!(feature = "gpu")),
+        ("lab", cfg!(feature = "lab")),
+        ("viewer", cfg!(feature = "viewer")),
+    ];
+    let features: Vec<&str> = features.iter().filter(|(_, is_on)| *is_on).map(|(name, _)| *name).collect();
+    let features = if features.is_empty() { "no features".to_owned() } else { features.join(", ") };
+    let revision = match env!("CAMSIM_REVISION") {
+        "" => String::new(),
+        revision => format!("{revision}; "),
+    };
+    format!("{} ({revision}{features})", env!("CARGO_PKG_VERSION"))
 }
 
 #[derive(Debug, Subcommand)]

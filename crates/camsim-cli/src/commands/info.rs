@@ -59,7 +59,7 @@ pub fn run(args: &InfoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         console.json(&info)?;
         return Ok(());
     }
-    console.line(format_args!("camsim {}", info.version))?;
+    console.line(format_args!("camsim {}", crate::version()))?;
     console.line(format_args!("renders on    {}", info.renders))?;
     for adapter in info.adapters.iter().filter(|adapter| !adapter.used) {
         console.line(format_args!(

@@ -2,10 +2,10 @@
 //!
 //! The rasteriser draws everything in full light, and terrain and models with as few triangles as will do.
 //! Squares of pixels that show ground with nothing before the sun stay as they are. In the others the ray of each
-//! pixel's middle finds the surface at full detail, from the triangle beside that of the
-//! pixel before, and a ray from there to the sun tells whether the pixel's colour turns to that of the shadow.
-//! At borders of shadows the fraction of the sun is that of rays over the pixel; pixels of several samples in
-//! which different surfaces meet beside a shadow are cast anew.
+//! pixel's middle finds the surface at full detail, from the triangle that the pixel before it shows, and a ray
+//! from there to the sun tells whether the pixel's colour turns to that of the shadow. At borders of shadows the
+//! fraction of the sun is that of rays over the pixel; pixels of several samples in which different surfaces meet
+//! beside a shadow are cast anew.
 
 use camsim_core::scene::{Aabb, TerrainTriangle, TerrainWalk, WalkHit};
 use camsim_plan::{FramePlan, KeyFrame, NEAR_M};

@@ -16,7 +16,6 @@ use camsim_core::{
     sequence::Sequence,
 };
 use common::{block, scenario};
-use glam::DVec3;
 
 const SUN: f64 = 0.7;
 const SKY: f64 = 0.3;

@@ -31,7 +31,7 @@ const HAIR_M: f64 = 1e-3;
 #[derive(Debug)]
 pub struct SunMap {
     to_sun_ned: DVec3,
-    /// Axes of the plane: level, and up towards the sun's zenith distance.
+    /// Axes of the plane: a level one, and one upwards.
     axes_ned: [DVec3; 2],
     /// Corner of the plane, metres.
     first_m: DVec2,
@@ -46,7 +46,7 @@ pub struct SunMap {
 #[derive(Debug, Default)]
 struct TileLists {
     asked: AtomicU32,
-    made: OnceLock<Lists>,
+    made: OnceLock<Box<Lists>>,
 }
 
 /// Triangles by texel, the nearest to the sun first.
@@ -99,7 +99,7 @@ impl SunMap {
         let size_m = terrain.bounds.max - terrain.bounds.min;
         let cell_m = [size_m.x / f64::from(terrain.cells[1]), size_m.y / f64::from(terrain.cells[0])];
         let cell_m = (cell_m[0] * cell_m[1]).sqrt();
-        // Level cells look as low as the sun stands; slopes do not.
+        // The sun sees level cells foreshortened by the sine of its elevation, and slopes less so.
         map.texel_m = cell_m * DVec2::new(1.0, 0.25 * elevation_cos - to_sun_ned.z);
         let all = map.extent(&terrain.bounds);
         map.first_m = all.low_m;
@@ -178,7 +178,7 @@ impl SunMap {
     }
 
     fn lists_of(&self, terrain: &Terrain, tile: usize) -> &Lists {
-        self.lists[tile].made.get_or_init(|| self.make_lists(terrain, tile))
+        self.lists[tile].made.get_or_init(|| Box::new(self.make_lists(terrain, tile)))
     }
 
     /// First texel of a tile.
@@ -230,10 +230,7 @@ impl SunMap {
         Seen {
             triangle,
             corners_m: corners_ned_m.map(|corner| self.project(corner)),
-            near_m: corners_ned_m
-                .map(|corner| corner.dot(self.to_sun_ned))
-                .into_iter()
-                .fold(f64::MIN, f64::max),
+            near_m: [a, b, c].map(|corner| corner.dot(self.to_sun_ned)).into_iter().fold(f64::MIN, f64::max),
             // Edge-on counts as away.
             faces_away: (b - a).cross(c - a).normalize_or_zero().dot(self.to_sun_ned) < 1e-9,
         }
