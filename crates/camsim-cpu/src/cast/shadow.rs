@@ -161,14 +161,15 @@ impl FrameCaster<'_> {
         if normal.dot(ray.direction_ned) > 0.0 { -normal } else { normal }
     }
 
-    /// Whether the terrain leaves the sun on all of itself in a box, and whether no model is in the box or may keep
-    /// the sun from it. False says nothing.
-    pub(super) fn is_open(&self, bounds: &Aabb) -> [bool; 2] {
-        let Some((sun_map, terrain)) = self.sun_map.zip(self.shader.scene.terrain.as_ref()) else {
-            return [false; 2];
-        };
-        let has_models = self.trees.any_model(|model| sun_map.may_shade(model, bounds));
-        [sun_map.is_lit_within(terrain, bounds), !has_models]
+    /// False only if no model is in a box or between it and the sun.
+    pub(super) fn may_have_models(&self, bounds: &Aabb) -> bool {
+        self.sun_map.is_none_or(|sun_map| self.trees.any_model(|model| sun_map.may_shade(model, bounds)))
+    }
+
+    /// True only if the terrain hides the sun from none of its triangles in a box that face it.
+    pub(super) fn is_lit_within(&self, bounds: &Aabb) -> bool {
+        let ground = self.sun_map.zip(self.shader.scene.terrain.as_ref());
+        ground.is_some_and(|(sun_map, terrain)| sun_map.is_lit_within(terrain, bounds))
     }
 
     /// Values of all pixels by their middles. Those at borders of shadows are made again, with the fractions of

@@ -198,8 +198,8 @@ impl<'a> FrameCaster<'a> {
     ) {
         let width = drawn.size_px[0];
         let columns = first_x..(first_x + SQUARE).min(width);
-        let (known, has_no_models) = self.middle_of_square([first_x, first_y], drawn);
-        search.may_have_models = !has_no_models;
+        let (known, may_have_models) = self.middle_of_square([first_x, first_y], drawn);
+        search.may_have_models = may_have_models;
         for (y, row) in rows.chunks_exact_mut(width).enumerate().map(|(k, row)| (first_y + k, row)) {
             let mut in_row = search.clone();
             for x in columns.clone() {
@@ -216,8 +216,8 @@ impl<'a> FrameCaster<'a> {
     }
 
     /// What all middles of a square are if it shows, with the pixels around it, nothing but sky, or nothing but
-    /// ground in the sun; and whether no model matters to it. The ground drawn is less than a pixel from that at
-    /// full detail.
+    /// ground in the sun; and whether models may be in it, or keep the sun from it. The ground drawn is less than a
+    /// pixel from that at full detail.
     fn middle_of_square(&self, first: [usize; 2], drawn: &Drawn) -> (Option<Middle>, bool) {
         let low = first.map(|first| first.saturating_sub(1));
         let high = [0, 1].map(|k: usize| (first[k] + SQUARE).min(drawn.size_px[k] - 1));
@@ -225,10 +225,10 @@ impl<'a> FrameCaster<'a> {
             (low[1]..=high[1]).flat_map(|y| (low[0]..=high[0]).map(move |x| drawn.inverse_depth(x, y)));
         let (far, near) = pixels.fold((f64::INFINITY, 0.0), |(far, near), w| (w.min(far), w.max(near)));
         if near == 0.0 {
-            return (Some(Middle { sun: 1.0, ..Middle::default() }), false);
+            return (Some(Middle { sun: 1.0, ..Middle::default() }), true);
         }
         if far == 0.0 {
-            return (None, false);
+            return (None, true);
         }
         let mut bounds = Aabb::EMPTY;
         for x in [low[0], high[0]] {
@@ -241,8 +241,9 @@ impl<'a> FrameCaster<'a> {
         }
         let open =
             Middle { surface: Some(0), seen: SeenLight::of_open_ground(), sun: 1.0, ..Middle::default() };
-        let [is_lit, has_no_models] = self.is_open(&bounds);
-        ((is_lit && has_no_models).then_some(open), has_no_models)
+        let may_have_models = self.may_have_models(&bounds);
+        let is_open = !may_have_models && self.is_lit_within(&bounds);
+        (is_open.then_some(open), may_have_models)
     }
 
     /// What a pixel's middle sees, where the rasteriser found this inverse depth (1/m).
