@@ -18,7 +18,8 @@ use super::{Aabb, Terrain, TerrainTriangle, intersect_triangle};
 
 /// Texels along a side of a tile.
 const TILE: u32 = 16;
-/// Rays that cost as much as a tile.
+/// Rays that are cast before a tile is made. Far, fine terrain is asked for few rays a tile: without them the first
+/// frame over ten million heights has an ideal frame that takes 18 % longer.
 const RAYS_A_TILE: u32 = 32;
 /// Most texels that are looked at for a box.
 const MOST_TEXELS: u64 = 2048;
