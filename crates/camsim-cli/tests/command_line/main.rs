@@ -76,7 +76,12 @@ fn help_names_every_command_and_every_exit_code() {
         assert!(out.contains("Usage: camsim"), "{out}");
     }
     let (code, version, _) = camsim(["--version"]);
-    assert!(code == 0 && version.contains("gpu") && version.starts_with("camsim 0."), "{version}");
+    assert!(
+        code == 0
+            && version.contains("gpu")
+            && version.starts_with(concat!("camsim ", env!("CARGO_PKG_VERSION"), " (")),
+        "{version}"
+    );
 }
 
 #[test]
