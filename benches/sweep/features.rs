@@ -13,7 +13,7 @@ use crate::{
 
 const LIMITS: RoundLimits = RoundLimits { burst: 8, rounds: 15, budget: Duration::from_secs(120) };
 
-/// A key with values that change nothing, and with others. The empty key is the scenario as it is, once more: it
+/// A key with values that change nothing (of shadows, the same light without them), and with others. The empty key is the scenario as it is, once more: it
 /// shows how far two rows differ by chance.
 const FEATURES: [(&str, &str, Option<&str>, Option<&str>); 10] = [
     ("the same again", "", Some(""), None),
