@@ -5,11 +5,11 @@
 //! A ray passes a triangle a, b, c on one side of all edges:
 //!
 //! ```text
-//! e = (u, v, 1) . (c x b) and so on, all positive or all negative,     |e - e(o)| <= |o| |(u, v, 1)| |c - b|
+//! e = (u, v, 1) . (c x b) + m . (c - b) and so on, all positive or all negative,     m = (u, v, 1) x o
 //! ```
 //!
-//! where e(o) is that of the ray's own origin. Single precision and this bound decide nearly all rays; those
-//! nearer to an edge are left to [`super::terrain::intersect_triangle`]. Ray parameters are in f64.
+//! Single precision decides nearly all rays; those nearer to an edge than its rounding are left to
+//! [`super::terrain::intersect_triangle`]. Ray parameters are in f64.
 
 #![expect(clippy::needless_range_loop, reason = "numbers of one ray have one index in all arrays")]
 
@@ -114,6 +114,8 @@ pub struct RayPacket {
     origin: [PerRay<f64>; 3],
     uv: [PerRay<f64>; 2],
     uv_f32: [PerRay<f32>; 2],
+    /// `(u, v, 1) x o`.
+    moment: [PerRay<f32>; 3],
     /// z of the direction, and ray parameters of the nearest hits for z = 1.
     z: PerRay<f64>,
     limit: PerRay<f64>,
@@ -138,6 +140,7 @@ impl Default for RayPacket {
             origin: Default::default(),
             uv: Default::default(),
             uv_f32: Default::default(),
+            moment: Default::default(),
             z: Default::default(),
             limit: Default::default(),
             found: Default::default(),
@@ -202,6 +205,12 @@ impl RayPacket {
                     self.uv_f32[axis][row][k] = value as f32;
                     low[axis] = if value < low[axis] { value } else { low[axis] };
                     high[axis] = if value > high[axis] { value } else { high[axis] };
+                }
+                let [u, v] = [direction[0] * per_z, direction[1] * per_z];
+                let moment =
+                    [v * origin[2] - origin[1], origin[0] - u * origin[2], u * origin[1] - v * origin[0]];
+                for axis in 0..3 {
+                    self.moment[axis][row][k] = moment[axis] as f32;
                 }
                 self.z[row][k] = direction[2];
                 self.limit[row][k] = ray.limit * direction[2];
@@ -343,11 +352,13 @@ impl RayPacket {
         }
         let [a, b, c] = corners;
         let edges = [c.cross(b), a.cross(c), b.cross(a)];
+        let sides = [c - b, a - c, b - a];
         let normal = (b - a).cross(c - a);
         let height = a.dot(normal);
-        let slack = self.slack(&corners, &edges);
+        let slack = self.slack(&corners, &edges, &sides);
         let is_two_sided = faces != Faces::Front;
         let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = edges.map(|edge| edge.as_vec3().to_array());
+        let [[p0, q0, r0], [p1, q1, r1], [p2, q2, r2]] = sides.map(|side| side.as_vec3().to_array());
         let id = self.met.len() as u32;
         let mut is_met = false;
         while rows != 0 {
@@ -356,10 +367,16 @@ impl RayPacket {
             let (u, v) = (&self.uv_f32[0][row], &self.uv_f32[1][row]);
             // How far inside all edges, from the front or from the back.
             let mut inside = [0.0_f32; ROW];
+            let [p, q, r] = [0, 1, 2].map(|axis| &self.moment[axis][row]);
             for k in 0..ROW {
-                let e0 = x0.mul_add(u[k], y0.mul_add(v[k], z0));
-                let e1 = x1.mul_add(u[k], y1.mul_add(v[k], z1));
-                let e2 = x2.mul_add(u[k], y2.mul_add(v[k], z2));
+                let of_origin = [
+                    p0.mul_add(p[k], q0.mul_add(q[k], r0 * r[k])),
+                    p1.mul_add(p[k], q1.mul_add(q[k], r1 * r[k])),
+                    p2.mul_add(p[k], q2.mul_add(q[k], r2 * r[k])),
+                ];
+                let e0 = x0.mul_add(u[k], y0.mul_add(v[k], z0 + of_origin[0]));
+                let e1 = x1.mul_add(u[k], y1.mul_add(v[k], z1 + of_origin[1]));
+                let e2 = x2.mul_add(u[k], y2.mul_add(v[k], z2 + of_origin[2]));
                 let low = if e0 < e1 { e0 } else { e1 };
                 let low = if e2 < low { e2 } else { low };
                 let high = if e0 > e1 { e0 } else { e1 };
@@ -406,23 +423,23 @@ impl RayPacket {
         }
     }
 
-    /// Bound of the difference between an edge function in single precision and that of a ray's own origin in
-    /// f64, rounding included.
+    /// Bound of the rounding of an edge function in single precision.
     #[inline(always)]
-    fn slack(&self, corners: &[DVec3; 3], edges: &[DVec3; 3]) -> f32 {
-        /// Of three numbers and their products and sums in single precision, relative to their sizes.
-        const SINGLE: f64 = 4e-7;
+    fn slack(&self, corners: &[DVec3; 3], edges: &[DVec3; 3], sides: &[DVec3; 3]) -> f32 {
+        /// Of six products and their sums in single precision, relative to their sizes.
+        const SINGLE: f64 = 6e-7;
         /// As in [`super::terrain::intersect_triangle`], with a reserve.
         const DOUBLE: f64 = 1e-14;
         let [a, b, c] = *corners;
         let [u, v] = self.bounds.map(|[low, high]| low.abs().max(high.abs()));
         let size = |edge: &DVec3| edge.x.abs() * u + edge.y.abs() * v + edge.z.abs();
         let size = size(&edges[0]).max(size(&edges[1])).max(size(&edges[2]));
-        let length = |side: DVec3| side.abs().element_sum();
-        let length = length(b - a).max(length(c - b)).max(length(a - c));
+        let length = sides.map(|side| side.abs().element_sum());
+        let length = length[0].max(length[1]).max(length[2]);
         let reach = a.abs().max(b.abs()).max(c.abs()).max_element() + self.spread_m;
-        let of_spread = self.spread_m * (1.0 + u + v) * length;
-        (1.001 * (SINGLE * size + of_spread + DOUBLE * reach * reach)) as f32
+        // No coordinate of a moment is larger than |o| (1 + |u| + |v|).
+        let of_origins = self.spread_m * (1.0 + u + v) * length;
+        (1.001 * (SINGLE * (size + of_origins) + DOUBLE * reach * reach)) as f32
     }
 
     /// What ray i has met.

@@ -8,10 +8,10 @@
 use camsim_core::{
     camera::CameraModel,
     pose::CameraPose,
-    scene::ray_packet::{PACKET_RAYS, PacketHit, PacketRay, RayPacket},
+    scene::ray_packet::{PACKET_RAYS, PacketRay, RayPacket},
     shutter::RowAxis,
 };
-use camsim_plan::PHASES;
+use camsim_plan::{Among, PHASES};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -24,6 +24,8 @@ use super::{
 pub(crate) const RAYS: u32 = 64;
 /// Largest error of a ray between those that are solved, pixels.
 const QUADRATIC_PX: f64 = 1e-4;
+/// Part of the path to a model by which ground is in front of it, at least.
+const ROUNDING: f64 = 1e-12;
 /// Longest reach, pixels. Beyond it a picture is all blur.
 const MOST_REACH_PX: f64 = 256.0;
 
@@ -48,9 +50,7 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
     let cameras = LineCameras::new(pixels, &near, &rays);
     let of_pixel = |packet: &mut RayPacket, i: usize| {
         let Some(Pixel { position, .. }) = pixels.pixel(i) else { return 0.0 };
-        if !near[i] {
-            return 1.0;
-        }
+        let Some(near) = near[i] else { return 1.0 };
         let uvs = uvs(&pixels.plan.camera, position, &rays);
         let of_rays: [PacketRay; PACKET_RAYS] = std::array::from_fn(|k| {
             let (t_s, CameraPose { position_ned_m, ned_from_camera }) = cameras.of(position)[k];
@@ -62,16 +62,37 @@ pub(super) fn coverage(pixels: &FramePixels<'_>) -> Vec<f32> {
             };
             uvs[k].map_or(PacketRay::NONE, to)
         });
-        let hits = pixels.rays.first_hits(packet, &of_rays, true);
-        let seen = hits.iter().zip(&of_rays).filter(|(_, ray)| ray.is_there());
-        let is_same =
-            |hit: &Option<PacketHit>| Some(object_of(pixels, hit.map(|hit| hit.surface))) == objects[i];
+        let surfaces = surfaces(pixels, packet, &of_rays, near);
+        let seen = surfaces.iter().zip(&of_rays).filter(|(_, ray)| ray.is_there());
+        let is_same = |surface: Option<u32>| Some(object_of(pixels, surface)) == objects[i];
         let (same, all) =
-            seen.fold((0_u32, 0_u32), |(same, all), (hit, _)| (same + u32::from(is_same(hit)), all + 1));
+            seen.fold((0_u32, 0_u32), |(same, all), (&seen, _)| (same + u32::from(is_same(seen)), all + 1));
         // Rays fail at the border of the lens's field only.
         if all == 0 { 1.0 } else { same as f32 / all as f32 }
     };
     (0..pixels.truth.len()).into_par_iter().with_min_len(256).map_init(RayPacket::default, of_pixel).collect()
+}
+
+/// Surface that each ray meets first. Where no sky is near, a ray that meets no model meets the ground, and another
+/// meets it only before the model.
+fn surfaces(
+    pixels: &FramePixels<'_>,
+    packet: &mut RayPacket,
+    rays: &[PacketRay; PACKET_RAYS],
+    near: Border,
+) -> [Option<u32>; PACKET_RAYS] {
+    let among = if near == Border::OfModels { Among::Models } else { Among::All };
+    let first = pixels.rays.first_hits(packet, rays, among).map(|hit| hit.map(|hit| (hit.t, hit.surface)));
+    if near == Border::OfSky {
+        return first.map(|hit| hit.map(|(_, surface)| surface));
+    }
+    let mut to_models = *rays;
+    for (ray, hit) in to_models.iter_mut().zip(first) {
+        *ray = hit.map_or(PacketRay::NONE, |(t, _)| PacketRay { limit: (1.0 - ROUNDING) * t, ..*ray });
+    }
+    let is_any = first.iter().any(Option::is_some);
+    let ground = if is_any { pixels.rays.first_hits(packet, &to_models, Among::Ground) } else { [None; _] };
+    std::array::from_fn(|k| Some(first[k].filter(|_| ground[k].is_none()).map_or(0, |(_, surface)| surface)))
 }
 
 /// Ideal rays of a pixel's positions. The lens's inverse is solved at nine, and quadratic between these if that is
@@ -109,12 +130,12 @@ struct LineCameras {
 }
 
 impl LineCameras {
-    fn new(pixels: &FramePixels<'_>, near: &[bool], rays: &[(DVec2, f64)]) -> Self {
+    fn new(pixels: &FramePixels<'_>, near: &[Option<Border>], rays: &[(DVec2, f64)]) -> Self {
         let [width, height] = pixels.plan.camera.size_px;
         let axis = pixels.plan.shutter.row_axis();
         let lines = if axis == RowAxis::Rows { height } else { 2 * width };
         let mut first = vec![None; lines as usize];
-        for i in (0..near.len()).filter(|&i| near[i]) {
+        for i in (0..near.len()).filter(|&i| near[i].is_some()) {
             let pixel = [i as u32 % width, i as u32 / width];
             first[line(axis, pixel)].get_or_insert(pixel);
         }
@@ -148,22 +169,34 @@ fn object_of(pixels: &FramePixels<'_>, surface: Option<u32>) -> u32 {
     surface.map_or(0, |surface| pixels.planner.sequence().scene.object_of_surface(surface))
 }
 
-/// Whether each pixel is within the reach of a pixel with another object, or nothing, beside it.
-fn near_borders(pixels: &FramePixels<'_>, objects: &[Option<u32>]) -> Vec<bool> {
+/// What a pixel may be near.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Border {
+    /// Borders of models with the ground, or with other models.
+    OfModels,
+    /// Borders with the sky, or with what is not in the picture.
+    OfSky,
+}
+
+/// Borders within whose reach each pixel is: those of pixels with another object, or nothing, beside them.
+fn near_borders(pixels: &FramePixels<'_>, objects: &[Option<u32>]) -> Vec<Option<Border>> {
     let around = || (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [dx, dy]));
+    let sky = Some(object_of(pixels, None));
     let reaches = pixels.map(&None, |pixel| {
         let [x, y] = pixel.position.map(i64::from);
-        let here = index(pixels, [x, y]).and_then(|i| objects[i]);
-        let is_at_border =
-            around().any(|[dx, dy]| index(pixels, [x + dx, y + dy]).and_then(|i| objects[i]) != here);
-        is_at_border.then(|| reach_px(pixels, pixel))
+        let object = |[dx, dy]: [i64; 2]| index(pixels, [x + dx, y + dy]).and_then(|i| objects[i]);
+        let is_at_border = around().any(|to| object(to) != object([0, 0]));
+        let has_sky = || around().map(object).any(|object| object.is_none() || object == sky);
+        let border = || if has_sky() { Border::OfSky } else { Border::OfModels };
+        is_at_border.then(|| (border(), reach_px(pixels, pixel)))
     });
     let [width, height] = pixels.plan.camera.size_px.map(|side| side as usize);
-    let mut near = vec![false; width * height];
-    for (i, [across, down]) in reaches.iter().enumerate().filter_map(|(i, reach)| Some((i, (*reach)?))) {
+    let mut near = vec![None; width * height];
+    for (i, (border, [across, down])) in reaches.iter().enumerate().filter_map(|(i, at)| Some((i, (*at)?))) {
         let (x, y) = (i % width, i / width);
         for row in y.saturating_sub(down)..(y + down + 1).min(height) {
-            near[row * width..][x.saturating_sub(across)..(x + across + 1).min(width)].fill(true);
+            let within = x.saturating_sub(across)..(x + across + 1).min(width);
+            near[row * width..][within].iter_mut().for_each(|near| *near = (*near).max(Some(border)));
         }
     }
     near

@@ -7,6 +7,7 @@ use camsim_core::{
     scenario::FlowState,
     scene::ray_packet::{PACKET_RAYS, PacketRay, RayPacket},
 };
+use camsim_plan::Among;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -58,13 +59,18 @@ pub(super) fn flow(pixels: &FramePixels<'_>, target: &FrameCamera) -> Vec<[f32; 
             if !rays.iter().any(PacketRay::is_there) {
                 continue;
             }
-            let hits = pixels.rays.first_hits(packet, &rays, is_any_in_doubt);
+            let hits = pixels.rays.first_hits(packet, &rays, hiding(is_any_in_doubt));
             for at in hits.iter().zip(places).filter_map(|(hit, at)| hit.and(at)) {
                 values[at][2] = f32::from(FlowState::Occluded as u8);
             }
         }
     });
     flow
+}
+
+/// What may hide a point, by whether the terrain may.
+fn hiding(is_in_doubt: bool) -> Among {
+    if is_in_doubt { Among::All } else { Among::Models }
 }
 
 fn value(shift: DVec2, state: FlowState) -> [f32; 3] {
@@ -107,7 +113,7 @@ impl Landing<'_> {
         };
         let is_hidden = |shown: &ImagePoint| {
             let ray = self.ray_to(point, &Shown::from(*shown));
-            ray.is_some_and(|ray| self.pixels.rays.is_hidden(&ray, self.is_in_doubt))
+            ray.is_some_and(|ray| self.pixels.rays.is_hidden(&ray, hiding(self.is_in_doubt)))
         };
         let mut seen = found.iter().filter(|shown| !is_hidden(shown));
         Some(match (seen.next(), seen.next()) {

@@ -23,7 +23,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::{
     ir::frame_plan::FramePlan,
-    view::surfaces::{SurfaceHit, Surfaces},
+    view::surfaces::{Among, SurfaceHit, Surfaces},
 };
 
 /// What the centre of a pixel sees.
@@ -172,7 +172,7 @@ impl<'a> FrameRays<'a> {
                 let limit = f64::INFINITY;
                 *ray = PacketRay { t_s: *t_s, origin_ned_m: pose.position_ned_m, direction_ned, limit };
             }
-            self.first_hits(packet, &rays, true)
+            self.first_hits(packet, &rays, Among::All)
         };
         let hits = hits_of(&self.mid, packet);
         let at_phase = (!self.at_phase.is_empty()).then(|| hits_of(&self.at_phase, packet));
@@ -184,25 +184,25 @@ impl<'a> FrameRays<'a> {
         }
     }
 
-    /// What rays near each other meet first, with or without the terrain. `packet` is scratch.
+    /// What rays near each other meet first among some of the surfaces. `packet` is scratch.
     pub fn first_hits(
         &self,
         packet: &mut RayPacket,
         rays: &[PacketRay; PACKET_RAYS],
-        with_terrain: bool,
+        among: Among,
     ) -> [Option<PacketHit>; PACKET_RAYS] {
         let mut hits = [None; PACKET_RAYS];
         let is_packet = packet.begin(rays);
         if is_packet {
-            self.surfaces.meet_still(packet, with_terrain);
+            self.surfaces.meet_still(packet, among);
         }
         for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.is_there()) {
             if !is_packet {
-                hits[i] = self.first_alone(ray, with_terrain).map(|hit| self.packet_hit(&hit));
+                hits[i] = self.surfaces.first_hit_among(among, *ray).map(|hit| self.packet_hit(&hit));
                 continue;
             }
             hits[i] = packet.hit(i);
-            if self.surfaces.moves() {
+            if self.surfaces.moves() && among != Among::Ground {
                 let PacketRay { t_s, origin_ned_m, direction_ned, limit } = *ray;
                 let limit = hits[i].map_or(limit, |hit| hit.t);
                 let moving = self.surfaces.moving_hit_at(t_s, origin_ned_m, direction_ned, limit);
@@ -264,17 +264,8 @@ impl<'a> FrameRays<'a> {
 
     /// Whether a ray meets a surface, or a model.
     #[must_use]
-    pub fn is_hidden(&self, ray: &PacketRay, with_terrain: bool) -> bool {
-        self.first_alone(ray, with_terrain).is_some()
-    }
-
-    fn first_alone(&self, ray: &PacketRay, with_terrain: bool) -> Option<SurfaceHit> {
-        let PacketRay { t_s, origin_ned_m, direction_ned, limit } = *ray;
-        let hit = match with_terrain {
-            true => self.surfaces.first_hit_at(t_s, origin_ned_m, direction_ned),
-            false => self.surfaces.model_hit_at(t_s, origin_ned_m, direction_ned, limit),
-        };
-        hit.filter(|hit| hit.depth_m <= limit)
+    pub fn is_hidden(&self, ray: &PacketRay, among: Among) -> bool {
+        self.surfaces.first_hit_among(among, *ray).is_some()
     }
 
     /// Whether there is anything but terrain.

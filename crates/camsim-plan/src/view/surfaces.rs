@@ -12,14 +12,29 @@ use std::{cell::RefCell, collections::HashMap, sync::Arc};
 use camsim_core::{
     pose::CameraPose,
     scene::{
-        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, proximity_bvh::ProximityBvh,
-        ray_bvh::RayBvh, ray_packet::RayPacket, terrain::Frustum, terrain::intersect_triangle,
+        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture,
+        proximity_bvh::ProximityBvh,
+        ray_bvh::RayBvh,
+        ray_packet::{PacketRay, RayPacket},
+        terrain::Frustum,
+        terrain::intersect_triangle,
     },
 };
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::ir::limits::NEAR_M;
 use moving::{MovingMeshes, moving_meshes};
+
+/// Surfaces that rays look for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Among {
+    /// All.
+    All,
+    /// The terrain.
+    Ground,
+    /// All but the terrain.
+    Models,
+}
 
 /// The surfaces of a scene, prepared for rays.
 #[derive(Debug)]
@@ -157,16 +172,38 @@ impl Surfaces {
         self.nearer_moving(t_s, origin_ned_m, direction_ned, f64::INFINITY, hit)
     }
 
-    /// Meets a packet of rays with all that stands still, as [`Self::first_hit_at`], or without the terrain.
-    pub fn meet_still(&self, packet: &mut RayPacket, with_terrain: bool) {
-        if let Some(terrain) = self.terrain().filter(|_| with_terrain) {
+    /// Meets a packet of rays with what stands still, as [`Self::first_hit_at`].
+    pub fn meet_still(&self, packet: &mut RayPacket, among: Among) {
+        if let Some(terrain) = self.terrain().filter(|_| among != Among::Models) {
             terrain.meet_packet(packet);
+        }
+        if among == Among::Ground {
+            return;
         }
         let still = self.deep_still.as_ref().unwrap_or(&self.deep);
         still.meet_packet(packet, (DMat3::IDENTITY, DVec3::ZERO), &mut |mesh, packet| {
             let tree = &self.shapes[mesh as usize].for_rays;
             self.scene.meshes[mesh as usize].meet_packet(packet, tree, 1 + mesh);
         });
+    }
+
+    /// First surface along `origin + t direction`, 0 <= t <= `limit`, at path time `t_s`.
+    pub fn first_hit_among(
+        &self,
+        among: Among,
+        PacketRay { t_s, origin_ned_m, direction_ned, limit }: PacketRay,
+    ) -> Option<SurfaceHit> {
+        let hit = match among {
+            Among::All => self.first_hit_at(t_s, origin_ned_m, direction_ned),
+            Among::Ground => self.ground_hit(origin_ned_m, direction_ned).map(SurfaceHit::of_terrain),
+            Among::Models => self.model_hit_at(t_s, origin_ned_m, direction_ned, limit),
+        };
+        hit.filter(|hit| hit.depth_m <= limit)
+    }
+
+    /// First point of the terrain along `origin + t direction`, t >= 0.
+    fn ground_hit(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<TerrainHit> {
+        self.terrain()?.intersect(origin_ned_m, direction_ned, f64::INFINITY)
     }
 
     /// What moves in front of `limit` along a ray at path time `t_s`.
@@ -239,8 +276,7 @@ impl Surfaces {
         origin_ned_m: DVec3,
         direction_ned: DVec3,
     ) -> Option<SurfaceHit> {
-        let ground =
-            self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
+        let ground = self.ground_hit(origin_ned_m, direction_ned);
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
         let on_mesh = self.model_hit_in(tree, origin_ned_m, direction_ned, limit);
         on_mesh.or_else(|| ground.map(SurfaceHit::of_terrain))
