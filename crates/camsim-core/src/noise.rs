@@ -1,8 +1,8 @@
 //! Counter-based noise: a pure function of (seed, frame, pixel, stream), independent of order, machine and
 //! restarts.
 //!
-//! f64 twin of `shaders/common/noise.wgsl`. It uses integer hashes and multiply-add only, so both agree to
-//! rounding.
+//! f64 twin of `camsim-gpu/shaders/common/noise.wgsl`. It uses integer hashes and multiply-add only, so both
+//! agree to rounding.
 
 /// Octaves of tail probability that 24 bits reach.
 const OCTAVES: usize = 24;

@@ -1,5 +1,5 @@
 //! Photometric stage: vignette, light, noise and saturation on linear values (section 7 and fig. 9 of the
-//! paper). f64 twin of `shaders/reverse/photometric.wgsl`.
+//! paper). f64 twin of `camsim-gpu/shaders/reverse/photometric.wgsl`.
 
 use glam::DVec2;
 

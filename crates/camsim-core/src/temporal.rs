@@ -1,8 +1,9 @@
 //! Temporal inverse and gather: from an output ray and an instant to the source in the ideal frame, and the
 //! mean colour over the exposure (section 6 of the paper).
 //!
-//! These functions are the f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and
-//! `shaders/reverse/gather/blur.wgsl`. The paper's own models are in [`displacement`] and [`paper`].
+//! These functions are the f64 twins of `camsim-gpu/shaders/reverse/temporal_inverse/reproject.wgsl` and
+//! `camsim-gpu/shaders/reverse/gather/blur.wgsl`. The paper's own models are in [`displacement`] and
+//! [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
 

@@ -1,9 +1,9 @@
 //! The reverse pass, vectorised over blocks of pixels of a row.
 //!
-//! Twin, stage by stage, of the kernel in `shaders/reverse`, for the sampling methods of most frames
-//! ([`camsim_plan::placement::cpu_vectorises`]). A software adapter's driver reads buffers, textures and
-//! conditions lane by lane; here all four channels are read at once, stages that no pixel of a block needs
-//! are skipped, and the output is written in place.
+//! Twin, stage by stage, of the kernel in `camsim-gpu/shaders/reverse`, for the sampling methods of most
+//! frames ([`camsim_plan::placement::cpu_vectorises`]). A software adapter's driver reads buffers, textures
+//! and conditions lane by lane; here all four channels are read at once, stages that no pixel of a block
+//! needs are skipped, and the output is written in place.
 
 #![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one index in all arrays")]
 
@@ -185,7 +185,7 @@ fn has_reference_poses(plan: &FramePlan) -> bool {
     moves && plan.truth && (plan.has_displaced_key() || plan.keys.len() > 1)
 }
 
-/// Entries per line of the pose table, as in shaders/reverse/temporal_inverse/line_entry.wgsl.
+/// Entries per line of the pose table, as in camsim-gpu/shaders/reverse/temporal_inverse/line_entry.wgsl.
 fn poses_per_line(frame: &FrameUniforms) -> usize {
     if frame.nodes == 1 { 1 } else { frame.nodes as usize + 1 }
 }

@@ -1,6 +1,6 @@
 //! What silhouette rays read of an ideal frame, in single precision: its edge pixels with their samples and
-//! borders, and the surface and colour at a position. Twin of `shaders/ideal/edge_mask.wgsl`,
-//! `shaders/ideal/edge_lines.wgsl` and `shaders/reverse/edges/silhouette_rays.wgsl`.
+//! borders, and the surface and colour at a position. Twin of `camsim-gpu/shaders/ideal/edge_mask.wgsl`,
+//! `camsim-gpu/shaders/ideal/edge_lines.wgsl` and `camsim-gpu/shaders/reverse/edges/silhouette_rays.wgsl`.
 
 mod edge_line;
 mod edge_mask;

@@ -78,7 +78,7 @@ fn copy_folder(from: &Path, to: &Path) {
 fn a_failed_gpu_pass_changes_no_other_frame() {
     let Some(folder) = std::env::var_os("CAMSIM_SHADER_DIR").map(PathBuf::from) else {
         let folder = std::env::temp_dir().join(format!("camsim-faults-{}", std::process::id()));
-        copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders"), &folder);
+        copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../camsim-gpu/shaders"), &folder);
         let again = Command::new(std::env::current_exe().expect("this program"))
             .args(["--exact", TEST])
             .env("CAMSIM_SHADER_DIR", &folder)

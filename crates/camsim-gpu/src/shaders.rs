@@ -13,7 +13,7 @@ use crate::adapter::GpuError;
 macro_rules! embedded {
     ($($path:literal),* $(,)?) => {
         /// All shader files: path below `shaders/`, text.
-        pub const FILES: &[(&str, &str)] = &[$(($path, include_str!(concat!("../../../shaders/", $path)))),*];
+        pub const FILES: &[(&str, &str)] = &[$(($path, include_str!(concat!("../shaders/", $path)))),*];
     };
 }
 
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn embedded_table_lists_every_shader_file() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shaders");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
         let mut paths = Vec::new();
         files_below(&root, &mut paths);
         let mut names: Vec<String> = paths

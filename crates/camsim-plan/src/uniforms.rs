@@ -21,7 +21,7 @@ use crate::ir::{
     stages::{EdgeStage, TemporalStage},
 };
 
-/// Mirror of `Frame` in shaders/common/frame.wgsl.
+/// Mirror of `Frame` in camsim-gpu/shaders/common/frame.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]
@@ -69,7 +69,7 @@ pub struct FrameUniforms {
     pub planes: [[f32; 4]; MAX_KEYS as usize],
 }
 
-/// Mirror of `IdealCamera` in shaders/ideal/camera.wgsl.
+/// Mirror of `IdealCamera` in camsim-gpu/shaders/ideal/camera.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]
@@ -87,7 +87,7 @@ pub struct IdealCamera {
     pub pad2: f32,
 }
 
-/// Mirror of `Truth` in shaders/reverse/edges/truth.wgsl.
+/// Mirror of `Truth` in camsim-gpu/shaders/reverse/edges/truth.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]

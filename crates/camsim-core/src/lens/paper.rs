@@ -1,5 +1,5 @@
 //! The paper's lens inverse (section 5): Gauss-Newton from the distorted point, without safeguards. f64 twin
-//! of `shaders/reverse/ray/gauss_newton.wgsl`.
+//! of `camsim-gpu/shaders/reverse/ray/gauss_newton.wgsl`.
 //!
 //! It is provided for comparison: it fails for some existing rays, and accepts roots beyond the fold that no
 //! lens shows. [`Lens::undistort`] is the one to use.

@@ -25,7 +25,7 @@ impl PrefilterTaps {
     pub const ALL: [Self; 4] = [Self::One, Self::Two, Self::Four, Self::Grid];
 }
 
-/// Constants of shaders/ideal/surface.wgsl and shaders/ideal/prefilter.
+/// Constants of camsim-gpu/shaders/ideal/surface.wgsl and camsim-gpu/shaders/ideal/prefilter.
 const CLOSE_TEXELS: f64 = 0.8;
 const CELL_VARIANCE: f64 = 1.5;
 const IN_A_ROW: f64 = 1.6;
@@ -58,7 +58,7 @@ impl MipBlend {
     }
 }
 
-/// Prefilter of an ideal pixel. f64 twin of `filtered_texture` in shaders/ideal/prefilter.
+/// Prefilter of an ideal pixel. f64 twin of `filtered_texture` in camsim-gpu/shaders/ideal/prefilter.
 #[derive(Clone, Debug)]
 pub struct Prefilter {
     /// Sides of the grid of taps, texels, and its taps.

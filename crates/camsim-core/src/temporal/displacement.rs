@@ -1,5 +1,5 @@
 //! The paper's displacement models: constant twist and constant depth (eqs. 10 to 18). f64 twins of
-//! `linear.wgsl` and `rk2.wgsl` in `shaders/reverse/temporal_inverse`.
+//! `linear.wgsl` and `rk2.wgsl` in `camsim-gpu/shaders/reverse/temporal_inverse`.
 
 use glam::{DVec2, DVec3};
 

@@ -1,5 +1,5 @@
 //! Borders of two surfaces within a pixel of a supersampled ideal frame, as straight lines fitted to the
-//! samples around. f64 twin of `shaders/ideal/edge_lines.wgsl`.
+//! samples around. f64 twin of `camsim-gpu/shaders/ideal/edge_lines.wgsl`.
 //!
 //! Four samples give the coverage of a pixel with an RMS error of 0.09. All samples along eight pixels of a
 //! straight border give it with 0.03.

@@ -1,5 +1,5 @@
 //! Edge mask of an ideal frame: the pixels that, with their neighbours, show more than one surface. f64 twin
-//! of `shaders/ideal/edge_mask.wgsl` and `shaders/ideal/thin_surfaces/`.
+//! of `camsim-gpu/shaders/ideal/edge_mask.wgsl` and `camsim-gpu/shaders/ideal/thin_surfaces/`.
 
 use super::supersampled::PixelCentre;
 

@@ -1,7 +1,7 @@
 //! Taps of an output pixel in the ideal frame: their kernel, their offsets from the source and their order
 //! over the exposure.
 //!
-//! f64 twin of `shaders/reverse/gather/tap`.
+//! f64 twin of `camsim-gpu/shaders/reverse/gather/tap`.
 
 use glam::{DVec2, DVec3};
 use serde::Serialize;

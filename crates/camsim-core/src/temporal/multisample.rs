@@ -1,6 +1,6 @@
 //! Multisampled ideal frames: positions of the four samples of a pixel, and the depth to which they resolve.
 //!
-//! f64 twin of `shaders/ideal/resolve_depth.wgsl`.
+//! f64 twin of `camsim-gpu/shaders/ideal/resolve_depth.wgsl`.
 
 use glam::DVec2;
 

@@ -1,6 +1,6 @@
 //! The paper's gather: samples on the straight segment between the two ends of the exposure, both ends
-//! included, on stored (encoded) values. f64 twins of `shaders/reverse/gather/straight.wgsl` and
-//! `shaders/reverse/color/srgb.wgsl`.
+//! included, on stored (encoded) values. f64 twins of `camsim-gpu/shaders/reverse/gather/straight.wgsl` and
+//! `camsim-gpu/shaders/reverse/color/srgb.wgsl`.
 
 use glam::{DVec2, DVec3};
 

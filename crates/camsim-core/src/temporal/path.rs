@@ -1,5 +1,5 @@
 //! Path of a source over the exposure: polynomials of time through a few positions that are known exactly.
-//! f64 twin of `shaders/reverse/gather/path/*.wgsl`.
+//! f64 twin of `camsim-gpu/shaders/reverse/gather/path/*.wgsl`.
 
 use glam::DVec2;
 

@@ -1,7 +1,7 @@
 //! Silhouette rays: a pixel that sees a silhouette gets rays of its own over its area and exposure. Each ray
 //! takes depth and colour from the one surface of the ideal frame that it meets. f64 twin of
-//! `shaders/reverse/edges/silhouette_rays.wgsl`. [`super::edge_mask`] decides which pixels get such rays;
-//! [`super::edge_lines`] locates borders within a pixel.
+//! `camsim-gpu/shaders/reverse/edges/silhouette_rays.wgsl`. [`super::edge_mask`] decides which pixels get
+//! such rays; [`super::edge_lines`] locates borders within a pixel.
 
 use glam::{DMat3, DVec2, DVec3};
 

@@ -1,5 +1,6 @@
 //! Supersampled ideal frames: depth and colour at a position. f64 twin of
-//! `shaders/reverse/edges/silhouette_rays.wgsl` (samples) and of `shaders/reverse/edges/color/` (colours).
+//! `camsim-gpu/shaders/reverse/edges/silhouette_rays.wgsl` (samples) and of
+//! `camsim-gpu/shaders/reverse/edges/color/` (colours).
 
 use glam::{DVec2, DVec3};
 

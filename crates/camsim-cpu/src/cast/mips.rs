@@ -1,5 +1,6 @@
-//! Textures with their mip levels, and filtered reads of them. Twin of `shaders/ideal/surface.wgsl`,
-//! `shaders/ideal/prefilter` and `shaders/ideal/texture`.
+//! Textures with their mip levels, and filtered reads of them. Twin of
+//! `camsim-gpu/shaders/ideal/surface.wgsl`, `camsim-gpu/shaders/ideal/prefilter` and
+//! `camsim-gpu/shaders/ideal/texture`.
 
 use std::{collections::HashMap, sync::Arc};
 

@@ -342,7 +342,7 @@ impl<'a> FrameCaster<'a> {
 }
 
 /// Resolves the inverse depths of samples to those of pixel centres. Twin of
-/// `shaders/ideal/resolve_depth.wgsl`.
+/// `camsim-gpu/shaders/ideal/resolve_depth.wgsl`.
 fn centre_depths(size_px: [u32; 2], samples: &[[f32; SAMPLES]]) -> Vec<f32> {
     let [width, height] = size_px.map(|side| side as usize);
     let first = |x: usize, y: usize| samples[y * width + x][0];

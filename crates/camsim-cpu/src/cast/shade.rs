@@ -1,4 +1,4 @@
-//! Colour of a triangle at a position of an ideal frame. Twin of `shaders/ideal`: `surface.wgsl`,
+//! Colour of a triangle at a position of an ideal frame. Twin of `camsim-gpu/shaders/ideal`: `surface.wgsl`,
 //! `mesh_color`, `light.wgsl` and `fog`.
 
 use std::sync::Arc;

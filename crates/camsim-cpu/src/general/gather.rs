@@ -1,5 +1,5 @@
 //! The path of a source over the exposure, and the mean of the ideal frame's colour along it. Twin of
-//! `shaders/reverse/gather`.
+//! `camsim-gpu/shaders/reverse/gather`.
 
 use camsim_core::temporal::{self, ColorImage, Footprint, PathStage, path};
 use camsim_plan::BlurStage;

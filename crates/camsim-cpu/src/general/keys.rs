@@ -1,4 +1,4 @@
-//! The ideal frames of an output frame. Twin of `shaders/reverse/keys`.
+//! The ideal frames of an output frame. Twin of `camsim-gpu/shaders/reverse/keys`.
 
 use camsim_core::temporal::{ColorImage, IdealGeometry, InverseDepthImage};
 use camsim_plan::FramePlan;

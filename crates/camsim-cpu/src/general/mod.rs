@@ -1,9 +1,9 @@
 //! The reverse pass for every plan, in double precision. It renders the plans that the vectorised pass does
 //! not support.
 //!
-//! The stages are those of the kernel in `shaders/reverse`, computed by the twins in `camsim_core`: ray of
-//! the output pixel, pose of its row, temporal inverse, gather over the exposure, silhouette rays,
-//! photometric stage, truth.
+//! The stages are those of the kernel in `camsim-gpu/shaders/reverse`, computed by the twins in
+//! `camsim_core`: ray of the output pixel, pose of its row, temporal inverse, gather over the exposure,
+//! silhouette rays, photometric stage, truth.
 
 use camsim_core::{
     noise::tail_table,

@@ -1,4 +1,5 @@
-//! Ideal rays of output pixels and how they change from pixel to pixel. Twin of `shaders/reverse/ray`.
+//! Ideal rays of output pixels and how they change from pixel to pixel. Twin of
+//! `camsim-gpu/shaders/reverse/ray`.
 
 use camsim_core::{
     camera::{CameraModel, INVALID_UV},

@@ -1,5 +1,5 @@
 //! Silhouette rays: detection of the pixels that may see several surfaces, and the mean colour of rays over
-//! their area and exposure. Twin of `shaders/reverse/edges`.
+//! their area and exposure. Twin of `camsim-gpu/shaders/reverse/edges`.
 
 use camsim_core::temporal::silhouette_rays::{nearest_first, subsample};
 use camsim_plan::EdgeStage;

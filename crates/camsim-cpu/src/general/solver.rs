@@ -1,5 +1,5 @@
 //! The temporal inverse: from a ray at its own instant to its source in a key frame. Twin of
-//! `shaders/reverse/temporal_inverse`.
+//! `camsim-gpu/shaders/reverse/temporal_inverse`.
 
 use camsim_core::{
     scenario::Preset,

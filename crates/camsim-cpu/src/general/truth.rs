@@ -1,4 +1,5 @@
-//! Depth and coordinates of pixels beside their colour. Twin of `shaders/reverse/edges/truth.wgsl`.
+//! Depth and coordinates of pixels beside their colour. Twin of
+//! `camsim-gpu/shaders/reverse/edges/truth.wgsl`.
 
 use glam::{DVec2, DVec3};
 

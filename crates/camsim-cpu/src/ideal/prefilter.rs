@@ -1,5 +1,5 @@
 //! Texture prefilter of the ideal frame, with as many taps as the plan says: twin of
-//! shaders/ideal/surface.wgsl and shaders/ideal/prefilter.
+//! camsim-gpu/shaders/ideal/surface.wgsl and camsim-gpu/shaders/ideal/prefilter.
 
 use camsim_plan::PrefilterTaps;
 

@@ -367,8 +367,8 @@ impl Shader<'_> {
         )
     }
 
-    /// Applies fog. Twin of shaders/ideal/fog. Pixels without a surface have the colour of the sky, which fog
-    /// does not change.
+    /// Applies fog. Twin of camsim-gpu/shaders/ideal/fog. Pixels without a surface have the colour of the
+    /// sky, which fog does not change.
     #[inline(always)]
     fn fog(&self, Block { positions, .. }: &Block, attributes: &BlockAttributes, colors: &mut Colors) {
         let Camera { uniforms, focal_px, principal_px, .. } = self.camera;

@@ -74,7 +74,8 @@ pub(super) struct TriangleKind {
 }
 
 impl TriangleKind {
-    /// Tint times illumination, from the [`EXTRA_ATTRIBUTES`] attributes. Twin of shaders/ideal/light.wgsl.
+    /// Tint times illumination, from the [`EXTRA_ATTRIBUTES`] attributes. Twin of
+    /// camsim-gpu/shaders/ideal/light.wgsl.
     #[inline(always)]
     pub fn illuminated(sky: Option<f32>, [r, g, b, a, sun, down]: [f32; EXTRA_ATTRIBUTES]) -> [f32; 4] {
         let Some(sky) = sky else { return [r, g, b, a] };

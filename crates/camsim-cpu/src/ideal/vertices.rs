@@ -103,7 +103,7 @@ impl Camera {
     }
 
     /// Transforms a position relative to the base, metres, as `key_camera_from_base` of
-    /// shaders/ideal/camera.wgsl.
+    /// camsim-gpu/shaders/ideal/camera.wgsl.
     #[inline(always)]
     pub fn in_camera_m(&self, from_base_m: [f32; 3]) -> [f32; 3] {
         let uniforms = &self.uniforms;

@@ -1,5 +1,5 @@
 //! Footprint of an output pixel in the ideal frame, and its taps: twin of
-//! shaders/reverse/gather/footprint.wgsl and its taps.
+//! camsim-gpu/shaders/reverse/gather/footprint.wgsl and its taps.
 
 use camsim_core::temporal::{MAX_AREA_SIDE_PX, tap_offsets};
 

@@ -1,4 +1,4 @@
-//! Gather over the exposure: twin of shaders/reverse/gather.
+//! Gather over the exposure: twin of camsim-gpu/shaders/reverse/gather.
 
 use camsim_plan::PathStage;
 

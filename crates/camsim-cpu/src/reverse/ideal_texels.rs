@@ -90,7 +90,8 @@ impl IdealTexels<'_> {
     }
 
     /// Inverse planar depth at the last look-up, 1/m: where it finds the sky, that of the nearest surface
-    /// within `sky_reach_px`. Twin of `surface_at` in shaders/reverse/temporal_inverse/reproject.wgsl.
+    /// within `sky_reach_px`. Twin of `surface_at` in
+    /// camsim-gpu/shaders/reverse/temporal_inverse/reproject.wgsl.
     #[inline(always)]
     pub(super) fn surface_at(&self, frame: &FrameUniforms, position_px: &Lanes2) -> Lanes {
         let mut found = self.inverse_depth(frame, position_px);

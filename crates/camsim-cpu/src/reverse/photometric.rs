@@ -1,5 +1,5 @@
-//! Vignette, brightness, noise and saturation: twin of shaders/reverse/photometric.wgsl and
-//! shaders/common/noise.wgsl.
+//! Vignette, brightness, noise and saturation: twin of camsim-gpu/shaders/reverse/photometric.wgsl and
+//! camsim-gpu/shaders/common/noise.wgsl.
 
 use camsim_core::{
     noise::{NOISE_STREAM, SEGMENTS, pcg4d},

@@ -1,4 +1,4 @@
-//! Ideal rays of output pixels and their derivatives: twin of shaders/reverse/ray.
+//! Ideal rays of output pixels and their derivatives: twin of camsim-gpu/shaders/reverse/ray.
 
 use camsim_core::camera::{CameraModel, INVALID_UV};
 

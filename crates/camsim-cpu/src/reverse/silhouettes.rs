@@ -1,4 +1,4 @@
-//! Pixels that may see several surfaces: twin of shaders/reverse/edges/list_candidates.wgsl.
+//! Pixels that may see several surfaces: twin of camsim-gpu/shaders/reverse/edges/list_candidates.wgsl.
 
 use camsim_plan::TemporalStage;
 

@@ -1,5 +1,5 @@
-//! Sources of rays in the ideal frame: twins of shaders/reverse/temporal_inverse and
-//! shaders/reverse/gather/nodes.
+//! Sources of rays in the ideal frame: twins of camsim-gpu/shaders/reverse/temporal_inverse and
+//! camsim-gpu/shaders/reverse/gather/nodes.
 
 use super::Stages;
 use crate::simd::lanes::{LANES, Lanes, Lanes2, Lanes3, ZERO, indicator, per_lane};

@@ -1,5 +1,5 @@
-//! Depth and coordinates beside the picture: twin of shaders/reverse/edges/truth.wgsl and
-//! shaders/reverse/keys.
+//! Depth and coordinates beside the picture: twin of camsim-gpu/shaders/reverse/edges/truth.wgsl and
+//! camsim-gpu/shaders/reverse/keys.
 
 use super::{
     Stages,

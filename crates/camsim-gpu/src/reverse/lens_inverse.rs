@@ -115,21 +115,21 @@ fn lens_table(lens: &Lens) -> Vec<f32> {
 pub fn shader_source(model: LensModel, start: Start) -> String {
     let [table, formula] = match model {
         LensModel::BrownConrady => [
-            include_str!("../../../../shaders/reverse/lens_inverse/table.wgsl"),
-            include_str!("../../../../shaders/reverse/lens_inverse/brown_conrady.wgsl"),
+            include_str!("../../shaders/reverse/lens_inverse/table.wgsl"),
+            include_str!("../../shaders/reverse/lens_inverse/brown_conrady.wgsl"),
         ],
         LensModel::KannalaBrandt => [
-            include_str!("../../../../shaders/reverse/lens_inverse/table.wgsl"),
-            include_str!("../../../../shaders/reverse/lens_inverse/kannala_brandt.wgsl"),
+            include_str!("../../shaders/reverse/lens_inverse/table.wgsl"),
+            include_str!("../../shaders/reverse/lens_inverse/kannala_brandt.wgsl"),
         ],
-        _ => ["", include_str!("../../../../shaders/reverse/lens_inverse/pinhole.wgsl")],
+        _ => ["", include_str!("../../shaders/reverse/lens_inverse/pinhole.wgsl")],
     };
     let start = match start {
-        Start::Cold => include_str!("../../../../shaders/reverse/lens_inverse/start_cold.wgsl"),
-        Start::Warm => include_str!("../../../../shaders/reverse/lens_inverse/start_warm.wgsl"),
+        Start::Cold => include_str!("../../shaders/reverse/lens_inverse/start_cold.wgsl"),
+        Start::Warm => include_str!("../../shaders/reverse/lens_inverse/start_warm.wgsl"),
     };
-    let common = include_str!("../../../../shaders/reverse/lens_inverse/lens.wgsl");
-    let main = include_str!("../../../../shaders/reverse/lens_inverse/main.wgsl");
+    let common = include_str!("../../shaders/reverse/lens_inverse/lens.wgsl");
+    let main = include_str!("../../shaders/reverse/lens_inverse/main.wgsl");
     [common, table, formula, start, main].concat()
 }
 
@@ -242,11 +242,10 @@ impl LensInversePass {
         }
     }
 
-    /// Records the pass that writes the lens map of `camera`, of a model with a shader, to `target`, a map of the
-    /// camera's size. `warm`,
-    /// the map of a camera of the same size and nearby zoom, only shortens the iteration to the same
-    /// solution: it must be a pure function of scenario and frame (the map of a zoom table entry, never that
-    /// of the previous frame).
+    /// Records the pass that writes the lens map of `camera`, of a model with a shader, to `target`, a map of
+    /// the camera's size. `warm`, the map of a camera of the same size and nearby zoom, only shortens the
+    /// iteration to the same solution: it must be a pure function of scenario and frame (the map of a zoom
+    /// table entry, never that of the previous frame).
     pub fn encode(
         &self,
         device: &wgpu::Device,

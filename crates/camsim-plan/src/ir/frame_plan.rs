@@ -27,7 +27,7 @@ use super::{
 };
 
 /// A row's camera that moves towards the nearest surface gives it at most this many times its inverse depth:
-/// as in `shaders/reverse/edges/near_silhouette.wgsl`.
+/// as in `camsim-gpu/shaders/reverse/edges/near_silhouette.wgsl`.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Everything that rendering one frame takes.
@@ -222,7 +222,8 @@ impl FramePlan {
 impl FramePlan {
     /// How far from a pixel's source the rays of that pixel may lead, ideal pixels. Their parallax: `w' = w /
     /// (1 - t_z w)` is at most the inverse depth that a row's camera gives to the nearest surface `w`, and
-    /// `shaders/reverse/edges/near_silhouette.wgsl`, which bounds it likewise, begins 2 % nearer than that.
+    /// `camsim-gpu/shaders/reverse/edges/near_silhouette.wgsl`, which bounds it likewise, begins 2 % nearer
+    /// than that.
     #[must_use]
     pub fn mark_reach_px(&self) -> u32 {
         let approach =

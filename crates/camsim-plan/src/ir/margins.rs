@@ -32,7 +32,7 @@ pub(crate) const STILL_VIEW: f64 = 0.1;
 /// Reach of marks, ideal pixels: for the reads around a source, and for rounding.
 pub(crate) const MARK_REACH_PX: f64 = 3.0;
 /// Inverse depth of the nearest surface from which on rays are searched: as in
-/// `shaders/reverse/edges/near_silhouette.wgsl`.
+/// `camsim-gpu/shaders/reverse/edges/near_silhouette.wgsl`.
 pub(crate) const NEARER: f64 = 1.02;
 /// Farthest that nine points see without a step between them: nothing farther is seen among them.
 pub(crate) const BEHIND: f64 = 1.05;

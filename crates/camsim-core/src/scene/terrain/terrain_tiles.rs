@@ -59,7 +59,7 @@ struct TapReach {
 }
 
 impl TapReach {
-    /// As in shaders/ideal/prefilter, plus 1.5 texels for the bilinear tap.
+    /// As in camsim-gpu/shaders/ideal/prefilter, plus 1.5 texels for the bilinear tap.
     fn of(reads: PrefilterTaps) -> Self {
         match reads {
             // At the pixel's centre.
