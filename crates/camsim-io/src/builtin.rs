@@ -3,26 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
+use camsim_assets::FILES;
+
 use crate::write::{WriteError, write_atomic};
-
-/// Embeds files of `assets/` as `FILES`: name and content.
-macro_rules! embedded {
-    ($($name:literal),* $(,)?) => {
-        const FILES: &[(&str, &[u8])] = &[$(($name, include_bytes!(concat!("../../../assets/", $name)))),*];
-    };
-}
-
-embedded![
-    "README.md",
-    "acircles.png",
-    "demo.toml",
-    "demo_camera.toml",
-    "demo_dem.tif",
-    "demo_flight.csv",
-    "demo_ortho.jpg",
-    "pattern.toml",
-    "vignette.png",
-];
 
 /// Writes the built-in files to a folder and returns the path of `demo.toml`. Files that are already there
 /// with the same content are left alone.
