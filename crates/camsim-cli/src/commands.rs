@@ -13,6 +13,7 @@ pub mod explain;
 pub mod export;
 pub mod info;
 pub mod lens;
+pub mod man;
 pub mod merge;
 pub mod render;
 #[cfg(feature = "lab")]

@@ -111,6 +111,8 @@ enum Command {
     Viewer(commands::viewer::ViewerArgs),
     Schema(commands::schema::SchemaArgs),
     Completions(commands::completions::CompletionsArgs),
+    #[command(hide = true)]
+    Man(commands::man::ManArgs),
 }
 
 /// Runs the program with the process's arguments.
@@ -161,6 +163,7 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Viewer(args) => commands::viewer::run(&args),
         Command::Schema(args) => commands::schema::run(&args, console),
         Command::Completions(args) => commands::completions::run::<Cli>(&args, console),
+        Command::Man(args) => commands::man::run::<Cli>(&args, console),
     }
 }
 

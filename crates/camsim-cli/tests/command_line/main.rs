@@ -93,6 +93,21 @@ fn completions_exist_for_every_shell() {
 }
 
 #[test]
+fn manual_pages_exist_for_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let pages = folder.path().join("man1");
+    let (code, _, err) = camsim(["man", text(&pages)]);
+    assert_eq!(code, 0, "{err}");
+    for page in ["camsim.1", "camsim-render.1", "camsim-camera-import.1"] {
+        let page = std::fs::read_to_string(pages.join(page)).unwrap();
+        assert!(page.contains(".SH SYNOPSIS"), "{page}");
+    }
+    let taken = pages.join("camsim.1");
+    let (code, _, err) = camsim(["man", text(&taken)]);
+    assert!(code == 1 && err.contains("camsim.1"), "{err}");
+}
+
+#[test]
 fn images_are_compared() {
     let assets = assets();
     let one = assets.join("acircles.png");
