@@ -15,6 +15,7 @@ pub mod info;
 pub mod lens;
 pub mod man;
 pub mod merge;
+pub mod new;
 pub mod render;
 #[cfg(feature = "lab")]
 pub mod reproduce;

@@ -37,6 +37,7 @@ use failure::Failure;
 const AFTER_HELP: &str = "\
 Examples:
   camsim demo                                     renders the built-in flight to ./camsim-demo
+  camsim new --log flight.csv --terrain dem.tif   writes a commented scenario
   camsim render flight.toml -o frames             renders every frame of a scenario
   camsim render flight.toml --frames 0..10 --set camera.shutter.readout_ms=0
   camsim explain flight.toml --frame 7            shows the plan of a frame, and what it skips
@@ -90,6 +91,7 @@ pub(crate) fn version() -> String {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(commands::demo::DemoArgs),
+    New(commands::new::NewArgs),
     Render(commands::render::RenderArgs),
     Explain(commands::explain::ExplainArgs),
     Verify(commands::verify::VerifyArgs),
@@ -142,6 +144,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stdout: &mut dyn Write, std
 fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => commands::demo::run(&args, console),
+        Command::New(args) => commands::new::run(args, console),
         Command::Render(args) => commands::render::run(&args, console),
         Command::Explain(args) => commands::explain::run(&args, console),
         Command::Verify(args) => commands::verify::run(&args, console),

@@ -39,6 +39,7 @@ mod sensors;
 mod track_points;
 mod unlikely;
 
+pub use coverage::{Outlook, outlook};
 pub use optics::vignette_warnings;
 use optics::{load_zoom_track, optics_warnings};
 pub use scene::board_position_ned_m;

@@ -1,4 +1,4 @@
-//! Warns of what a flight over terrain sees too much of: ground beyond the ortho-image, and sky.
+//! What a flight over terrain sees, and warnings of too much: ground beyond the ortho-image, and sky.
 
 use camsim_core::{camera::CameraModel, scenario::Beyond, scene::Aabb, sequence::Sequence};
 use glam::{DVec2, DVec3};
@@ -67,8 +67,33 @@ pub(super) fn ortho_warning(sequence: &Sequence, summary: &TerrainSummary) -> Op
     ))
 }
 
-/// Warns how much of the frames is sky. Models and patterns count as the boxes around them.
-pub(super) fn sky_warning(sequence: &Sequence) -> Option<String> {
+/// What the frames of a flight over terrain see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outlook {
+    /// Smallest and largest height of the camera above the ground under it, metres; below 0 under ground.
+    pub above_ground_m: [f64; 2],
+    /// Fraction of sky, 0 to 1.
+    pub sky: f64,
+}
+
+/// What up to 25 frames see; `None` without terrain, or where no frame is above or below it.
+#[must_use]
+pub fn outlook(sequence: &Sequence) -> Option<Outlook> {
+    let terrain = sequence.scene.terrain.as_ref()?;
+    let height_m = |sample: &Sample| {
+        let to = |direction| terrain.intersect(sample.from_ned_m, direction, f64::INFINITY).map(|hit| hit.t);
+        to(DVec3::Z).or_else(|| to(DVec3::NEG_Z).map(|t| -t))
+    };
+    let samples = samples(sequence);
+    let firsts = samples.chunk_by(|a, b| a.frame == b.frame).map(|of_frame| &of_frame[0]);
+    let heights_m: Vec<f64> = firsts.filter_map(height_m).collect();
+    let above_ground_m =
+        [heights_m.iter().copied().reduce(f64::min)?, heights_m.iter().copied().reduce(f64::max)?];
+    Some(Outlook { above_ground_m, sky: sky_fraction(sequence, &samples)? })
+}
+
+/// Fraction of samples that see sky. Models and patterns count as the boxes around them.
+fn sky_fraction(sequence: &Sequence, samples: &[Sample]) -> Option<f64> {
     let scene = &sequence.scene;
     let terrain = scene.terrain.as_ref()?;
     let boxes: Vec<Aabb> = scene.meshes.iter().map(|mesh| mesh.bounds()).collect();
@@ -76,8 +101,13 @@ pub(super) fn sky_warning(sequence: &Sequence) -> Option<String> {
         let (from, direction) = (sample.from_ned_m, sample.direction_ned?);
         Some(!terrain.blocks(from, direction) && !boxes.iter().any(|bounds| is_hit(bounds, from, direction)))
     };
-    let seen: Vec<bool> = samples(sequence).iter().filter_map(sees_sky).collect();
-    let fraction = seen.iter().filter(|is_sky| **is_sky).count() as f64 / seen.len().max(1) as f64;
+    let seen: Vec<bool> = samples.iter().filter_map(sees_sky).collect();
+    Some(seen.iter().filter(|is_sky| **is_sky).count() as f64 / seen.len().max(1) as f64)
+}
+
+/// Warns how much of the frames is sky.
+pub(super) fn sky_warning(sequence: &Sequence) -> Option<String> {
+    let fraction = sky_fraction(sequence, &samples(sequence))?;
     (fraction > MOST_SKY).then(|| {
         format!(
             "about {:.0} % of the frames is sky, or positions where the terrain has no heights: check camera.mount, \

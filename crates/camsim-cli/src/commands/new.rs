@@ -1,0 +1,328 @@
+//! `camsim new`: a scenario that renders, from what there is.
+
+use std::{
+    fmt::Write as _,
+    io::{BufRead, IsTerminal, Write},
+    path::{Component, Path, PathBuf},
+};
+
+use anyhow::anyhow;
+use camsim_io::{builtin, load, write::write_atomic};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    inputs::{Changes, read_changed_rig},
+};
+
+/// Write a commented scenario that renders
+///
+/// Without --log and --terrain it has the built-in flight and terrain, without --camera the camera of --like. In a
+/// terminal and without options it asks. What it has written is loaded at once: it prints how many frames there
+/// are, and how high above ground they are taken.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  camsim new                                             asks, and writes ./flight.toml
+  camsim new survey.toml --like mapping                  a survey of the built-in terrain
+  camsim new --log flight.ulg --terrain dem.tif --ortho ortho.jpg
+  camsim new --log poses.csv --terrain dem.tif --camera cam0.toml --for learning
+  camsim new board.toml --like euroc --for calibration   a stereo pair before a board")]
+pub struct NewArgs {
+    /// File to write
+    #[arg(value_name = "SCENARIO", default_value = "flight.toml")]
+    output: PathBuf,
+    /// Camera to begin with, and what it is for
+    #[arg(long, value_enum)]
+    like: Option<Like>,
+    /// Flight log of any format that is read
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Elevation model: a GeoTIFF, ASCII grid or HGT file
+    #[arg(long, value_name = "FILE")]
+    terrain: Option<PathBuf>,
+    /// Picture of the ground: a GeoTIFF, or a picture of the same extent as the terrain
+    #[arg(long, value_name = "FILE", requires = "terrain")]
+    ortho: Option<PathBuf>,
+    /// Camera file; `camsim camera import` makes one of other programs' calibrations
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    /// What the frames are for: channels, sensors and target follow
+    #[arg(long = "for", value_enum, value_name = "PURPOSE")]
+    purpose: Option<Purpose>,
+}
+
+/// Cameras that need no file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Like {
+    /// A small drone's camera with a rolling shutter, 30 frames a second
+    Drone,
+    /// A stereo pair as in the EuRoC data set, 20 frames a second
+    Euroc,
+    /// A survey camera that looks straight down, a frame every two seconds
+    Mapping,
+}
+
+/// What frames are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Purpose {
+    /// Visual odometry and SLAM: an inertial unit, depth, times of rows
+    Odometry,
+    /// Calibration: a board that the camera moves before
+    Calibration,
+    /// Maps and reconstruction: depth and world coordinates
+    Mapping,
+    /// Training: depth, flow, normals, objects
+    Learning,
+}
+
+impl Like {
+    fn camera(self) -> &'static str {
+        match self {
+            Self::Drone => include_str!("new/drone.toml"),
+            Self::Euroc => include_str!("new/euroc.toml"),
+            Self::Mapping => include_str!("new/mapping.toml"),
+        }
+    }
+
+    /// Pitch of its mount. A board stands ahead.
+    fn pitch_deg(self, purpose: Purpose) -> &'static str {
+        match self {
+            _ if purpose == Purpose::Calibration => "0.0",
+            Self::Drone | Self::Euroc => "-40.0",
+            Self::Mapping => "-90.0",
+        }
+    }
+
+    fn purpose(self) -> Purpose {
+        match self {
+            Self::Drone | Self::Euroc => Purpose::Odometry,
+            Self::Mapping => Purpose::Mapping,
+        }
+    }
+}
+
+impl Purpose {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Odometry => include_str!("new/for_odometry.toml"),
+            Self::Calibration => include_str!("new/for_calibration.toml"),
+            Self::Mapping => include_str!("new/for_mapping.toml"),
+            Self::Learning => include_str!("new/for_learning.toml"),
+        }
+    }
+
+    /// A command that goes on from the scenario, and what it does.
+    fn next(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Odometry => ("export SCENARIO --as euroc -o seq", "the folder that VIO programs read"),
+            Self::Calibration => {
+                ("board SCENARIO -o board.png --points points.csv", "the board and its corners")
+            }
+            Self::Mapping => ("export SCENARIO --as colmap -o model", "cameras and poses for COLMAP"),
+            Self::Learning => ("export SCENARIO --as webdataset -o shards", "samples for training"),
+        }
+    }
+}
+
+/// Runs `camsim new`.
+pub fn run(mut args: NewArgs, console: &mut Console<'_>) -> Result<(), Failure> {
+    let has_options = args.like.is_some() || args.purpose.is_some() || args.camera.is_some();
+    let is_bare = !has_options && args.log.is_none() && args.terrain.is_none();
+    if is_bare && std::io::stdin().is_terminal() {
+        ask_for_all(&mut args)?;
+    }
+    if args.output.exists() {
+        let output = args.output.display();
+        return Err(Failure::bad_input(anyhow!(
+            "{output} is there already: remove it, or name another file"
+        )));
+    }
+    let like = args.like.unwrap_or(match args.purpose {
+        Some(Purpose::Mapping) => Like::Mapping,
+        _ => Like::Drone,
+    });
+    let purpose = args.purpose.unwrap_or_else(|| like.purpose());
+    let folder = args.output.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).or_failed()?;
+    let text = scenario(&args, like, purpose, folder)?;
+    write_atomic(&args.output, text.as_bytes()).or_failed()?;
+    console.line(format_args!("{}", args.output.display()))?;
+    check(&args.output, console)?;
+    say_next(&args.output, purpose, console)
+}
+
+/// The scenario's text; what it names and has no file is written beside it.
+fn scenario(args: &NewArgs, like: Like, purpose: Purpose, folder: &Path) -> Result<String, Failure> {
+    let has_board = purpose == Purpose::Calibration;
+    if has_board && (args.log.is_some() || args.terrain.is_some()) {
+        return Err(Failure::bad_input(anyhow!(
+            "--for calibration moves the camera before a board: leave out --log and --terrain"
+        )));
+    }
+    let folder = Folder(folder.canonicalize().or_failed()?);
+    let top = match &args.camera {
+        Some(camera) => format!("camera = {}\n", folder.file(camera)?),
+        None => String::new(),
+    };
+    let flight = match &args.log {
+        Some(log) => format!(
+            "log = {}\n\
+             height = \"msl\"                     # of the log: above mean sea level, or \"ellipsoid\"\n\
+             # window_s = [0.0, 10.0]           # a part of the log, from its first row on\n",
+            folder.file(log)?
+        ),
+        None if has_board => format!("log = {}\n", folder.board_motion()?),
+        None => format!(
+            "log = {}\n\
+             height = \"msl\"                     # above mean sea level\n\
+             window_s = [20.0, 30.0]            # a part of the log's 46 s\n",
+            folder.built_in("demo_flight.csv")?
+        ),
+    };
+    let camera = match &args.camera {
+        Some(_) => String::new(),
+        None => format!("{}\n", like.camera().replace("PITCH_DEG", like.pitch_deg(purpose))),
+    };
+    let scene = if has_board { String::new() } else { scene(args, &folder)? };
+    Ok(format!(
+        "# `camsim explain` shows what a frame takes, `camsim render --print-default` every key there is.\n\
+         {top}\n\
+         [flight]\n{flight}\n\
+         [tracker]\n\
+         kind = \"spline\"                    # smooth velocities and accelerations\n\n\
+         {camera}{scene}{}",
+        purpose.text()
+    ))
+}
+
+fn scene(args: &NewArgs, folder: &Folder) -> Result<String, Failure> {
+    let (dem, ortho) = match &args.terrain {
+        Some(dem) => (folder.file(dem)?, args.ortho.as_ref().map(|ortho| folder.file(ortho)).transpose()?),
+        None => (folder.built_in("demo_dem.tif")?, Some(folder.built_in("demo_ortho.jpg")?)),
+    };
+    let ortho = ortho.map_or_else(String::new, |ortho| format!("ortho = {ortho}, "));
+    Ok(format!("[scene]\nterrain = {{ dem = {dem}, {ortho}height = \"msl\" }}\nsky = [0.74, 0.83, 0.92]\n\n"))
+}
+
+/// The scenario's folder, as a whole path.
+struct Folder(PathBuf);
+
+impl Folder {
+    /// A file that is there, as TOML has it: from this folder on.
+    fn file(&self, path: &Path) -> Result<String, Failure> {
+        let missing = |error| Failure::bad_input(anyhow!("{}: {error}", path.display()));
+        let path = relative(&path.canonicalize().map_err(missing)?, &self.0);
+        Ok(toml::Value::String(path.to_string_lossy().into_owned()).to_string())
+    }
+
+    fn built_in(&self, name: &str) -> Result<String, Failure> {
+        self.file(&builtin::write_file(name, &self.0).or_failed()?)
+    }
+
+    fn board_motion(&self) -> Result<String, Failure> {
+        let log = self.0.join("board_motion.csv");
+        write_atomic(&log, board_motion().as_bytes()).or_failed()?;
+        self.file(&log)
+    }
+}
+
+/// A platform that looks north at the origin from all sides, within 25 degrees and from 0.9 to 1.5 m: CSV of 20 s.
+fn board_motion() -> String {
+    let mut csv = String::from("t_s,north_m,east_m,down_m,roll_deg,pitch_deg,yaw_deg\n");
+    for k in 0..=200 {
+        let t_s = 0.1 * f64::from(k);
+        let (yaw, pitch) = (25.0 * (0.9 * t_s).sin(), 20.0 * (0.57 * t_s).sin());
+        let (roll, away_m) = (15.0 * (0.4 * t_s).sin(), 1.2 - 0.3 * (0.31 * t_s).cos());
+        let (sin_yaw, cos_yaw) = yaw.to_radians().sin_cos();
+        let (sin_pitch, cos_pitch) = pitch.to_radians().sin_cos();
+        let _ = writeln!(
+            csv,
+            "{t_s:.1},{:.5},{:.5},{:.5},{roll:.4},{pitch:.4},{yaw:.4}",
+            -away_m * cos_pitch * cos_yaw,
+            -away_m * cos_pitch * sin_yaw,
+            away_m * sin_pitch,
+        );
+    }
+    csv
+}
+
+/// A whole path from a whole folder on.
+fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let common = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    if common == 0 {
+        return path.to_owned();
+    }
+    let up = folder.components().skip(common).map(|_| Component::ParentDir);
+    up.chain(path.components().skip(common)).collect()
+}
+
+/// Loads what was written, and says what its cameras see.
+fn check(path: &Path, console: &mut Console<'_>) -> Result<(), Failure> {
+    let rig = read_changed_rig(path, &Changes::default(), None, console)?;
+    for loaded in load::load_rig(&rig).or_bad_input()? {
+        let sequence = &loaded.sequence;
+        let name = match sequence.scenario.camera.name.as_str() {
+            "" => "camera".to_owned(),
+            name => format!("camera {name}"),
+        };
+        let seconds = sequence.frames as f64 / sequence.scenario.camera.fps;
+        let mut line = format!("  {name}: {} frames, {seconds:.1} s", sequence.frames);
+        if let Some(load::Outlook { above_ground_m: [low, high], sky }) = load::outlook(sequence) {
+            let _ = write!(line, ", {low:.0} to {high:.0} m above ground, {:.0} % sky", 100.0 * sky);
+        }
+        console.line(line)?;
+        for warning in &loaded.warnings {
+            console.warn(warning);
+        }
+    }
+    Ok(())
+}
+
+fn say_next(path: &Path, purpose: Purpose, console: &mut Console<'_>) -> Result<(), Failure> {
+    let scenario = path.display().to_string();
+    let (next, what) = purpose.next();
+    console.line("next")?;
+    console.line(format_args!("  camsim render {scenario} -o frames --frames 0..5"))?;
+    console.line(format_args!("  camsim {}   {what}", next.replace("SCENARIO", &scenario)))?;
+    Ok(())
+}
+
+/// Asks for what the options give.
+fn ask_for_all(args: &mut NewArgs) -> Result<(), Failure> {
+    let file = |question: &str| -> Result<Option<PathBuf>, Failure> {
+        Ok(Some(ask(question)?).filter(|answer| !answer.is_empty()).map(PathBuf::from))
+    };
+    args.log = file("flight log (Enter: the built-in flight)")?;
+    args.terrain = file("elevation model (Enter: the built-in terrain)")?;
+    if args.terrain.is_some() {
+        args.ortho = file("picture of the ground (Enter: none)")?;
+    }
+    args.camera = file("camera file (Enter: a built-in one)")?;
+    if args.camera.is_none() {
+        args.like = choose("camera")?;
+    }
+    args.purpose = choose("purpose")?;
+    Ok(())
+}
+
+/// Asks for one of the words; `None` for none.
+fn choose<T: clap::ValueEnum>(what: &str) -> Result<Option<T>, Failure> {
+    let names = T::value_variants().iter().filter_map(clap::ValueEnum::to_possible_value);
+    let names: Vec<String> = names.map(|value| value.get_name().to_owned()).collect();
+    let answer = ask(&format!("{what}: {} (Enter: {})", names.join(", "), names[0]))?;
+    if answer.is_empty() {
+        return Ok(None);
+    }
+    T::from_str(&answer, true).map(Some).map_err(|_| {
+        Failure::bad_input(anyhow!("`{answer}` is no {what}: write one of {}", names.join(", ")))
+    })
+}
+
+fn ask(question: &str) -> Result<String, Failure> {
+    let mut terminal = std::io::stderr();
+    write!(terminal, "{question}: ").and_then(|()| terminal.flush()).or_failed()?;
+    let mut answer = String::new();
+    std::io::stdin().lock().read_line(&mut answer).or_failed()?;
+    Ok(answer.trim().to_owned())
+}
