@@ -29,14 +29,11 @@ use stage::{Part, Stage};
 
 /// Render the frames of a scenario
 ///
-/// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv
-/// (with mount and vibration), frames.csv (stamp, pose, ideal frame and files of each frame) and run.json,
-/// which repeats the run: `camsim render DIR/run.json`; with [output.tracks], points.csv and tracks.csv (the
-/// exact pixel of points of the scene in each frame). Each twin of the frames ([[output.twin]]) has a folder of
-/// its own among them, with frames.csv, camera.toml and run.json. Each camera of a rig ([[cameras]]) has such a
-/// folder, DIR/NAME, and DIR has run.json, rig.toml and trajectory.csv. Paths in these files are relative to them, so
-/// a folder can be moved together with its input files. Ctrl-C stops after the current frames, and prints the
-/// command that resumes the run.
+/// The output folder holds a folder for each channel, tables of frames and poses, the camera, and run.json, which
+/// `camsim render DIR/run.json` renders again. The cameras of a rig have a folder each, and so have twins
+/// ([[output.twin]]). docs/reference/RUNS.md lists all files. A folder can be moved together with its input files.
+///
+/// Ctrl-C stops after the current frames and prints the command that resumes the run.
 #[derive(Debug, Default, clap::Args)]
 #[command(after_help = "\
 Examples:
