@@ -1,9 +1,6 @@
 //! `camsim cluster`: scripts that render a scenario in shards, on a cluster or on one machine.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use camsim_io::{portable::write_scenario, shell::quoted, write::write_atomic};
@@ -210,7 +207,7 @@ fn write_script(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).or_failed()?;
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).or_failed()?;
     }
     Ok(())
 }
