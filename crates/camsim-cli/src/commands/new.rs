@@ -300,23 +300,23 @@ fn ask_for_all(args: &mut NewArgs) -> Result<(), Failure> {
     }
     args.camera = file("camera file (Enter: a built-in one)")?;
     if args.camera.is_none() {
-        args.like = choose("camera")?;
+        args.like = Some(choose("camera", Like::Drone)?);
     }
-    args.purpose = choose("purpose")?;
+    args.purpose = Some(choose("purpose", args.like.map_or(Purpose::Odometry, Like::purpose))?);
     Ok(())
 }
 
-/// Asks for one of the words; `None` for none.
-fn choose<T: clap::ValueEnum>(what: &str) -> Result<Option<T>, Failure> {
-    let names = T::value_variants().iter().filter_map(clap::ValueEnum::to_possible_value);
-    let names: Vec<String> = names.map(|value| value.get_name().to_owned()).collect();
-    let answer = ask(&format!("{what}: {} (Enter: {})", names.join(", "), names[0]))?;
+/// Asks for one of the words.
+fn choose<T: clap::ValueEnum>(what: &str, default: T) -> Result<T, Failure> {
+    let name =
+        |value: &T| value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+    let names = T::value_variants().iter().map(name).collect::<Vec<_>>().join(", ");
+    let answer = ask(&format!("{what}: {names} (Enter: {})", name(&default)))?;
     if answer.is_empty() {
-        return Ok(None);
+        return Ok(default);
     }
-    T::from_str(&answer, true).map(Some).map_err(|_| {
-        Failure::bad_input(anyhow!("`{answer}` is no {what}: write one of {}", names.join(", ")))
-    })
+    T::from_str(&answer, true)
+        .map_err(|_| Failure::bad_input(anyhow!("`{answer}` is no {what}: write one of {names}")))
 }
 
 fn ask(question: &str) -> Result<String, Failure> {
