@@ -206,7 +206,7 @@ impl RayPacket {
                     low[axis] = if value < low[axis] { value } else { low[axis] };
                     high[axis] = if value > high[axis] { value } else { high[axis] };
                 }
-                let [u, v] = [direction[0] * per_z, direction[1] * per_z];
+                let [u, v] = [self.uv[0][row][k], self.uv[1][row][k]];
                 let moment =
                     [v * origin[2] - origin[1], origin[0] - u * origin[2], u * origin[1] - v * origin[0]];
                 for axis in 0..3 {
