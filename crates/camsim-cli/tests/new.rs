@@ -71,17 +71,30 @@ fn files_are_named_from_the_scenarios_folder_on() {
 #[test]
 fn what_cannot_be_is_refused_before_a_file_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    let scenario = folder.path().join("flight.toml");
-    let scenario_text = scenario.to_str().unwrap();
+    let scenario = folder.path().join("new/flight.toml");
+    let scenario = scenario.to_str().unwrap();
     let log = assets().join("demo_flight.csv");
     let log = log.to_str().unwrap();
     for (options, wanted) in [
         (vec!["--log", log, "--for", "calibration"], "leave out --log"),
-        (vec!["--log", "no-such.csv"], "no-such.csv"),
+        (vec!["--terrain", "no-such.tif"], "no-such.tif"),
         (vec!["--ortho", "ortho.jpg"], "--terrain"),
+        (vec!["--camera", log, "--like", "euroc"], "--like"),
     ] {
-        let (code, _, err) = camsim(&[&["new", scenario_text][..], &options].concat());
+        let (code, _, err) = camsim(&[&["new", scenario][..], &options].concat());
         assert!(code == 2 && err.contains(wanted), "{err}");
-        assert!(!scenario.exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "{options:?}");
     }
+}
+
+#[test]
+fn no_file_of_the_users_is_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("board_motion.csv");
+    fs::write(&log, "mine").unwrap();
+    let scenario = folder.path().join("flight.toml");
+    let (code, _, err) = camsim(&["new", scenario.to_str().unwrap(), "--for", "calibration"]);
+    assert!(code == 2 && err.contains("board_motion.csv is there already"), "{err}");
+    assert_eq!(fs::read_to_string(&log).unwrap(), "mine");
+    assert!(!scenario.exists());
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use camsim_assets::FILES;
+pub use camsim_assets::FILES;
 
 use crate::write::{WriteError, write_atomic};
 
@@ -13,21 +13,12 @@ use crate::write::{WriteError, write_atomic};
 /// # Errors
 /// [`WriteError`] names the file.
 pub fn unpack(folder: &Path) -> Result<PathBuf, WriteError> {
-    for (name, _) in FILES {
-        write_file(name, folder)?;
+    for (name, bytes) in FILES {
+        let path = folder.join(name);
+        if std::fs::read(&path).is_ok_and(|existing| existing == *bytes) {
+            continue;
+        }
+        write_atomic(&path, bytes)?;
     }
     Ok(folder.join("demo.toml"))
-}
-
-/// Writes one of the built-in files to a folder, as [`unpack`], and returns its path.
-///
-/// # Errors
-/// [`WriteError`] names the file.
-pub fn write_file(name: &str, folder: &Path) -> Result<PathBuf, WriteError> {
-    let path = folder.join(name);
-    let content = FILES.iter().find(|(of, _)| *of == name).map_or(&[][..], |(_, bytes)| bytes);
-    if !std::fs::read(&path).is_ok_and(|existing| existing == content) {
-        write_atomic(&path, content)?;
-    }
-    Ok(path)
 }

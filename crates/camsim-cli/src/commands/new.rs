@@ -3,16 +3,16 @@
 use std::{
     fmt::Write as _,
     io::{BufRead, IsTerminal, Write},
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use anyhow::anyhow;
-use camsim_io::{builtin, load, write::write_atomic};
+use camsim_io::{builtin, load, portable::relative_to, write::write_atomic};
 
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
-    inputs::{Changes, read_changed_rig},
+    inputs::{Changes, load_cameras, read_changed_rig},
 };
 
 /// Write a commented scenario that renders
@@ -45,12 +45,15 @@ pub struct NewArgs {
     #[arg(long, value_name = "FILE", requires = "terrain")]
     ortho: Option<PathBuf>,
     /// Camera file; `camsim camera import` makes one of other programs' calibrations
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "like")]
     camera: Option<PathBuf>,
     /// What the frames are for: channels, sensors and target follow
     #[arg(long = "for", value_enum, value_name = "PURPOSE")]
     purpose: Option<Purpose>,
 }
+
+/// Log of the camera that moves before a board.
+const BOARD_MOTION: &str = "board_motion.csv";
 
 /// Cameras that need no file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -143,6 +146,12 @@ pub fn run(mut args: NewArgs, console: &mut Console<'_>) -> Result<(), Failure> 
         _ => Like::Drone,
     });
     let purpose = args.purpose.unwrap_or_else(|| like.purpose());
+    refuse_missing(&args)?;
+    if purpose == Purpose::Calibration && (args.log.is_some() || args.terrain.is_some()) {
+        return Err(Failure::bad_input(anyhow!(
+            "--for calibration moves the camera before a board: leave out --log and --terrain"
+        )));
+    }
     let folder = args.output.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).or_failed()?;
     let text = scenario(&args, like, purpose, folder)?;
@@ -152,15 +161,18 @@ pub fn run(mut args: NewArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     say_next(&args.output, purpose, console)
 }
 
+/// Refuses files that are not there, before anything is written.
+fn refuse_missing(args: &NewArgs) -> Result<(), Failure> {
+    for path in [&args.log, &args.terrain, &args.ortho, &args.camera].into_iter().flatten() {
+        path.metadata().map_err(|error| Failure::bad_input(anyhow!("{}: {error}", path.display())))?;
+    }
+    Ok(())
+}
+
 /// The scenario's text; what it names and has no file is written beside it.
 fn scenario(args: &NewArgs, like: Like, purpose: Purpose, folder: &Path) -> Result<String, Failure> {
     let has_board = purpose == Purpose::Calibration;
-    if has_board && (args.log.is_some() || args.terrain.is_some()) {
-        return Err(Failure::bad_input(anyhow!(
-            "--for calibration moves the camera before a board: leave out --log and --terrain"
-        )));
-    }
-    let folder = Folder(folder.canonicalize().or_failed()?);
+    let folder = Folder(folder);
     let top = match &args.camera {
         Some(camera) => format!("camera = {}\n", folder.file(camera)?),
         None => String::new(),
@@ -172,7 +184,10 @@ fn scenario(args: &NewArgs, like: Like, purpose: Purpose, folder: &Path) -> Resu
              # window_s = [0.0, 10.0]           # a part of the log, from its first row on\n",
             folder.file(log)?
         ),
-        None if has_board => format!("log = {}\n", folder.board_motion()?),
+        None if has_board => {
+            folder.write(BOARD_MOTION, board_motion().as_bytes())?;
+            format!("log = \"{BOARD_MOTION}\"\n")
+        }
         None => format!(
             "log = {}\n\
              height = \"msl\"                     # above mean sea level\n\
@@ -205,25 +220,37 @@ fn scene(args: &NewArgs, folder: &Folder) -> Result<String, Failure> {
     Ok(format!("[scene]\nterrain = {{ dem = {dem}, {ortho}height = \"msl\" }}\nsky = [0.74, 0.83, 0.92]\n\n"))
 }
 
-/// The scenario's folder, as a whole path.
-struct Folder(PathBuf);
+/// The scenario's folder.
+struct Folder<'a>(&'a Path);
 
-impl Folder {
-    /// A file that is there, as TOML has it: from this folder on.
+impl Folder<'_> {
+    /// The path of a file from this folder on, as a TOML string.
     fn file(&self, path: &Path) -> Result<String, Failure> {
-        let missing = |error| Failure::bad_input(anyhow!("{}: {error}", path.display()));
-        let path = relative(&path.canonicalize().map_err(missing)?, &self.0);
-        Ok(toml::Value::String(path.to_string_lossy().into_owned()).to_string())
+        let relative = relative_to(path, self.0);
+        let text = relative.to_str().ok_or_else(|| {
+            Failure::bad_input(anyhow!("{}: a scenario holds Unicode only: rename it", path.display()))
+        })?;
+        Ok(toml::Value::String(text.to_owned()).to_string())
     }
 
     fn built_in(&self, name: &str) -> Result<String, Failure> {
-        self.file(&builtin::write_file(name, &self.0).or_failed()?)
+        for (_, bytes) in builtin::FILES.iter().filter(|(of, _)| *of == name) {
+            self.write(name, bytes)?;
+        }
+        self.file(&self.0.join(name))
     }
 
-    fn board_motion(&self) -> Result<String, Failure> {
-        let log = self.0.join("board_motion.csv");
-        write_atomic(&log, board_motion().as_bytes()).or_failed()?;
-        self.file(&log)
+    /// Writes a file, but over no other.
+    fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        let path = self.0.join(name);
+        match std::fs::read(&path) {
+            Ok(existing) if existing == bytes => Ok(()),
+            Ok(_) => Err(Failure::bad_input(anyhow!(
+                "{} is there already and is another file: write the scenario into another folder",
+                path.display()
+            ))),
+            Err(_) => write_atomic(&path, bytes).or_failed(),
+        }
     }
 }
 
@@ -247,20 +274,10 @@ fn board_motion() -> String {
     csv
 }
 
-/// A whole path from a whole folder on.
-fn relative(path: &Path, folder: &Path) -> PathBuf {
-    let common = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
-    if common == 0 {
-        return path.to_owned();
-    }
-    let up = folder.components().skip(common).map(|_| Component::ParentDir);
-    up.chain(path.components().skip(common)).collect()
-}
-
 /// Loads what was written, and says what its cameras see.
 fn check(path: &Path, console: &mut Console<'_>) -> Result<(), Failure> {
     let rig = read_changed_rig(path, &Changes::default(), None, console)?;
-    for loaded in load::load_rig(&rig).or_bad_input()? {
+    for loaded in load_cameras(&rig, &[], console)? {
         let sequence = &loaded.sequence;
         let name = match sequence.scenario.camera.name.as_str() {
             "" => "camera".to_owned(),
@@ -272,9 +289,6 @@ fn check(path: &Path, console: &mut Console<'_>) -> Result<(), Failure> {
             let _ = write!(line, ", {low:.0} to {high:.0} m above ground, {:.0} % sky", 100.0 * sky);
         }
         console.line(line)?;
-        for warning in &loaded.warnings {
-            console.warn(warning);
-        }
     }
     Ok(())
 }
