@@ -1,4 +1,4 @@
-//! Frame rates of the built-in flight: of the whole camera, and with each effect left out.
+//! Frame rates of the built-in flight: of the whole camera, and without each of its effects.
 //!
 //! A second table has terrains of different sizes seen straight down: the visible ground is the same, so only
 //! what is out of sight differs. `CAMSIM_TERRAIN_SIDES` sets their sides ("513 1025 4097"; 16385 takes 10 GB
@@ -43,7 +43,7 @@ fn main() -> Outcome<()> {
     terrain_sizes(&renderers, demo, is_measuring)
 }
 
-/// The whole camera, and with each effect left out.
+/// The whole camera, and without each of its effects.
 fn effects(renderers: &Renderers, demo: &Sequence, is_measuring: bool) -> Outcome<()> {
     let color = &demo.scenario.output.channels;
     let with_truth = [color.as_slice(), &[Channel::Depth, Channel::Coords]].concat();

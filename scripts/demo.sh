@@ -6,5 +6,5 @@ cd "$(dirname "$0")/.."
 . scripts/setup.sh
 
 setup
-say "building and running (the first build takes some minutes; the window and the experiments are left out: cargo build --release adds them)"
+say "building and running (the first build takes some minutes; without the window and the experiments: cargo build --release adds them)"
 exec cargo run --release --no-default-features --features gpu -- demo "$@"

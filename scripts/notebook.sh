@@ -10,7 +10,7 @@ venv=${CARGO_TARGET_DIR:-$PWD/target}/notebook-venv
 }
 [ -z "${CAMSIM_WHEEL:-}" ] || "$venv/bin/pip" install -q --force-reinstall --no-deps "$CAMSIM_WHEEL"
 [ -n "${CAMSIM_WHEEL:-}" ] || export PYTHONPATH="$PWD/python"
-# Times and versions of this machine are left out, so that a run changes what it shows alone.
+# Times and versions of this machine are removed, so that a run changes what it shows alone.
 "$venv/bin/jupyter-nbconvert" --to notebook --execute --inplace --ExecutePreprocessor.record_timing=False docs/python/tour.ipynb
 size=$(wc -c < docs/python/tour.ipynb)
 [ "$size" -le 500000 ] || {

@@ -38,7 +38,7 @@ pub fn with_paper_preset(sequence: &Sequence) -> Arc<Sequence> {
     Arc::new(sequence)
 }
 
-/// Effects of a camera that are left out.
+/// Effects that a camera lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ablation {
     /// None: the camera as it is.

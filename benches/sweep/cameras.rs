@@ -130,7 +130,7 @@ pub fn blur(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
     Ok(())
 }
 
-/// The full camera, and with each effect left out.
+/// The full camera, and without each of its effects.
 pub fn effects(renderers: &Renderers, is_measuring: bool) -> Outcome<()> {
     each_effect_left_out(renderers, &all_effects_with(&[])?, "variant", is_measuring)
 }

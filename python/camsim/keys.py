@@ -242,7 +242,7 @@ Keys = TypedDict(
         "quality.max_error_px": float | None,
         "quality.max_error_dn": float | None,
         "quality.max_terrain_error_px": float | None,
-        "quality.solver": Literal["auto", "linear", "rk2", "reproject", "oracle"] | None,
+        "quality.solver": Literal["auto", "linear", "rk2", "reproject", "reference"] | None,
         "quality.iterations": int | Literal["auto"] | None,
         "quality.blur_samples": int | Literal["auto"] | None,
         "quality.footprint_taps": int | Literal["auto"] | None,

@@ -41,9 +41,9 @@ class Lens:
         """
         :param size_px: Width, height.
         :param focal_px: fx, fy.
-        :param principal_point_px: cx, cy; the centre of the picture if left out.
+        :param principal_point_px: cx, cy; the centre of the picture if omitted.
         :param model: As `camera.lens.model`: ``"pinhole"``, ``"brown-conrady"``, ``"kannala-brandt"`` ...
-        :param coefficients: In the model's order; trailing zeros may be left out. OpenCV's shape (1, N) will do.
+        :param coefficients: In the model's order; trailing zeros may be omitted. OpenCV's shape (1, N) will do.
         """
         size = pair_of(size_px, "size_px", "width, height")
         if any(side <= 0 or side != int(side) or side >= 2**32 for side in size):

@@ -126,11 +126,11 @@ def apply(
     :param depth: Planar depth, metres, height x width; 0, NaN and 1e9 or more are none. Needed where the camera moves.
     :param motion: How the camera moves about the stamp.
     :param focal_px: fx, fy of the ideal picture.
-    :param principal_point_px: cx, cy of it; its centre if left out.
+    :param principal_point_px: cx, cy of it; its centre if omitted.
     :param instant_ms: Its instant, after the stamp.
     :param holes: Where there is no depth: ``"far"`` (infinitely far) or ``"mark"`` (no source).
     :param preset: ``"default"`` or ``"paper"``.
-    :param blur_samples: Number of exposure samples; by the length of the path if left out.
+    :param blur_samples: Number of exposure samples; by the length of the path if omitted.
     :param seed, frame: Of the noise.
 
     >>> camera = {"size_px": [640, 480], "focal_px": [420, 420], "fps": 30, "shutter": {"readout_ms": 30}}
@@ -286,7 +286,7 @@ def _plain(tree: Any) -> Any:
 def verify(scenario: Scenario, frames: int | Sequence[int] | None = None, *, pictures: bool = False) -> dict[str, Any]:
     """Measures errors against the reference renderer, which traces exact rays: slow. See `camsim verify --json`.
 
-    :param frames: A number, or several; five, evenly spread, if left out.
+    :param frames: A number, or several; five, evenly spread, if omitted.
     :param pictures: Measure the error of the pictures, too.
     :returns: `kept` says whether all tolerances are; `frames` has the figures of each.
 

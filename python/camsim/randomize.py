@@ -163,7 +163,7 @@ class Variations(Sequence["Scenario"]):
         return (self.scenario._variation(number) for number in range(len(self)))
 
     def check(self, start: int = 0, stop: int | None = None) -> None:
-        """Checks variations from `start` to before `stop`, all if left out. Nothing is loaded or rendered: some
+        """Checks variations from `start` to before `stop`, all if omitted. Nothing is loaded or rendered: some
         thousands take a second.
 
         :raises camsim.InputError: A drawn value is out of range; the message has number, key and value.
@@ -216,8 +216,8 @@ def randomize(
 
     :param scenario: The scenario whose keys are drawn, on top of those that its own `[randomize]` draws.
     :param laws: Keys with distributions: objects, or tables as in a file, ``{"uniform": [2, 10]}``.
-    :param seed: Of the draws; the scenario's if left out.
-    :param count: How many variations there are; any number if left out.
+    :param seed: Of the draws; the scenario's if omitted.
+    :param count: How many variations there are; any number if omitted.
     :param own_seed: Give each variation a seed of its own, so that its noise differs.
     :raises camsim.InputError: A key or a distribution does not fit. Drawn values are checked by `Variations.check`, which
         iteration begins with.

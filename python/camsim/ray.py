@@ -58,8 +58,8 @@ def dataset(
     `frame` and `stamp_ns`; of variations also `variation` and the drawn numbers by key.
 
     :param source: A scenario, or variations with a count.
-    :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
-    :param frames: Numbers of the frames; all of a scenario, and the first of each variation, if left out.
+    :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if omitted.
+    :param frames: Numbers of the frames; all of a scenario, and the first of each variation, if omitted.
     :param concurrency: Number of actors, or the fewest and the most.
     :param num_cpus: Processors of each actor.
     :param batch_size: Samples that an actor renders at once.

@@ -60,10 +60,10 @@ class Scenario(Sequence[Frame]):
 
         :param path: The file.
         :param sets: Keys with values on top of the file's, as `--set` of the command line.
-        :param camera: Name of one of `[[cameras]]`; the first if left out.
+        :param camera: Name of one of `[[cameras]]`; the first if omitted.
         :param preset: ``"default"`` or ``"paper"``.
         :param backend: ``"cpu"``, ``"gpu"``, ``"reference"`` (exact rays in double precision, slowly), or ``"auto"``: the
-            gpu on a graphics card, else the cpu, and the reference renderer if `quality.solver` is ``"oracle"``.
+            gpu on a graphics card, else the cpu, and the reference renderer if `quality.solver` is ``"reference"``.
         :raises camsim.InputError: The message names the file, line or key and what to do.
 
         >>> scenario = Scenario.load("flight.toml", sets={"camera.shutter.readout_ms": 0})
@@ -84,7 +84,7 @@ class Scenario(Sequence[Frame]):
     ) -> Scenario:
         """A scenario from a tree of keys, as `to_dict` gives it.
 
-        :param tree: Tables, lists, numbers and text; what is left out has its default. Instead of paths there may be
+        :param tree: Tables, lists, numbers and text; what is omitted has its default. Instead of paths there may be
             a `PoseTable` (log), a `HeightMap` (DEM), and pictures as arrays of bytes.
         :param folder: The folder that relative paths are in.
 
@@ -273,7 +273,7 @@ class Scenario(Sequence[Frame]):
         """Renders one frame. Several in order are faster by `frames`.
 
         :param index: Number of the frame; negative from the end.
-        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
+        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if omitted.
         :raises IndexError: There is no such frame.
         """
         number = self._number(index)
@@ -293,7 +293,7 @@ class Scenario(Sequence[Frame]):
         """Renders frames in order; while Python works on one, the next ones are under way.
 
         :param start, stop, step: As those of a slice of this scenario.
-        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
+        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if omitted.
         :param twins: Render the twins of each frame too, with the channels of `[[output.twin]]` or those of the frame;
             `Frame.twin` gives them.
         :param progress: Show a bar by tqdm, if that is installed.
@@ -318,7 +318,7 @@ class Scenario(Sequence[Frame]):
         return Frames(self._native, numbers, channels, self._twin_specs() if twins else [])
 
     def explain(self, frame: int = 0, *, as_dict: bool = False) -> Any:
-        """The plan of a frame: passes, sizes, samples, predicted errors, what is left out and why.
+        """The plan of a frame: passes, sizes, samples, predicted errors, what is skipped and why.
 
         :param as_dict: Give what `camsim explain --json` prints; else the text for people.
 

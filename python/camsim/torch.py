@@ -49,8 +49,8 @@ class Dataset(torch.utils.data.Dataset[Any]):  # type: ignore[misc, unused-ignor
     ) -> None:
         """
         :param source: A scenario, or variations with a count.
-        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if left out.
-        :param frames: Numbers of the frames; all of a scenario, and the first of each variation, if left out.
+        :param channels: Names as in `docs/reference/CHANNELS.md`; those of `output.channels` if omitted.
+        :param frames: Numbers of the frames; all of a scenario, and the first of each variation, if omitted.
         :param transform: Called with each sample.
         """
         self._samples = Samples(source, channels, frames)

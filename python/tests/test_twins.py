@@ -109,8 +109,8 @@ def test_the_reference_renderer_is_that_of_the_command_line(pattern: pathlib.Pat
     fast = camsim.Scenario.load(pattern, sets=TINY, backend="cpu")
     assert 0 < camsim.compare(fast[3].color, frames[0].color).rmse < 0.02
     # As on the command line it becomes a part of the scenario.
-    assert scenario.to_dict()["quality"]["solver"] == "oracle"
-    exact = camsim.Scenario.load(pattern, sets=TINY | {"quality.solver": "oracle"})
+    assert scenario.to_dict()["quality"]["solver"] == "reference"
+    exact = camsim.Scenario.load(pattern, sets=TINY | {"quality.solver": "reference"})
     assert np.array_equal(exact.render(7, ["color"]).color, single.color)
     assert np.array_equal(pickle.loads(pickle.dumps(scenario)).render(7, ["color"]).color, single.color)
     told = run_program("explain", tmp_path / "scenario.json", "--frame", "7", "--quiet")
@@ -121,7 +121,7 @@ def test_what_the_reference_renderer_cannot_do_is_said(pattern: pathlib.Path) ->
     with pytest.raises(camsim.InputError, match="cannot be combined with --backend reference"):
         camsim.Scenario.load(pattern, sets={"quality.solver": "rk2"}, backend="reference")
     with pytest.raises(camsim.InputError, match='"gpu" and "reference"'):
-        camsim.Scenario.load(pattern, backend="oracle")
+        camsim.Scenario.load(pattern, backend="reference")
 
 
 def test_the_demo_needs_no_file(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path) -> None:

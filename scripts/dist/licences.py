@@ -19,7 +19,7 @@ compiler-rt and libunwind, with programs linked by zig: Apache-2.0 WITH LLVM-exc
 
 
 def linked(target: str, package: str, features: list[str]) -> list[dict]:
-    """The crates that the program is made of, itself and those of its workspace left out."""
+    """The crates that the program is made of, without itself and those of its workspace."""
     words = ["cargo", "metadata", "--format-version", "1", "--locked", "--filter-platform", target]
     if features:
         words += ["--no-default-features", "--features", ",".join(f"{package}/{feature}" for feature in features)]

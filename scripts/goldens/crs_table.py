@@ -89,7 +89,7 @@ def main():
             found += 1
         if found < 2:
             del points[len(points) - found:]
-            print("left out", code, crs.name)
+            print("skipped", code, crs.name)
             continue
         rows.append(("projected", code, crs.name, f"{text} +towgs84={shift}" if shift else text, accuracy))
     projected = {r[1] for r in rows} | RULES

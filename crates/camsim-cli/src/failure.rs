@@ -114,7 +114,7 @@ impl From<VerifyError> for Failure {
         match error {
             VerifyError::Render(error) => error.into(),
             VerifyError::NoCoords(_) => Self::failed(error),
-            VerifyError::Solver | VerifyError::TooLarge { .. } | VerifyError::Oracle(_) => {
+            VerifyError::Solver | VerifyError::TooLarge { .. } | VerifyError::Reference(_) => {
                 Self::bad_input(error)
             }
         }

@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use camsim_core::{
     deferred_photometric::DeferredPhotometric,
     imaging::{ImageSensor, Optics},
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Auto, Preset, Primary, Scenario, Solver},
     scene::LodSelection,
     sequence::Sequence,
@@ -95,7 +95,7 @@ impl FrameSource for EngineSource<'_> {
 /// Whether a scenario is rendered by the reference renderer.
 #[must_use]
 pub fn is_reference(scenario: &Scenario) -> bool {
-    scenario.quality.solver == Auto::Value(Solver::Oracle)
+    scenario.quality.solver == Auto::Value(Solver::Reference)
 }
 
 /// The scenario with the reference renderer as a part of it.
@@ -113,16 +113,18 @@ pub fn with_reference(mut scenario: Scenario) -> Result<Scenario, Failure> {
         return refused("quality.preset = \"paper\"");
     }
     match scenario.quality.solver {
-        Auto::Auto | Auto::Value(Solver::Oracle) => scenario.quality.solver = Auto::Value(Solver::Oracle),
+        Auto::Auto | Auto::Value(Solver::Reference) => {
+            scenario.quality.solver = Auto::Value(Solver::Reference)
+        }
         Auto::Value(Solver::Linear) => return refused("quality.solver = \"linear\""),
         Auto::Value(Solver::Rk2) => return refused("quality.solver = \"rk2\""),
         Auto::Value(Solver::Reproject) => return refused("quality.solver = \"reproject\""),
     }
-    // Keys that are valid with `auto` but not with the oracle.
+    // Keys that are valid with `auto` but not with the reference.
     match validate(&scenario).first() {
-        Some(problem) => {
-            Err(Failure::bad_input(anyhow!("{problem} (--backend reference is quality.solver = \"oracle\")")))
-        }
+        Some(problem) => Err(Failure::bad_input(anyhow!(
+            "{problem} (--backend reference is quality.solver = \"reference\")"
+        ))),
         None => Ok(scenario),
     }
 }
@@ -138,8 +140,8 @@ const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 #[derive(Debug)]
 pub struct ReferenceSource {
     /// One; or one a face, or one of each colour of each face.
-    oracles: Vec<Oracle>,
-    /// These three are for what parts are joined to; a single oracle has its own.
+    references: Vec<ReferenceRenderer>,
+    /// These three are for what parts are joined to; a single reference has its own.
     late: Option<DeferredPhotometric>,
     optics: Option<Optics>,
     sensor: Option<ImageSensor>,
@@ -168,17 +170,18 @@ impl ReferenceSource {
             1 => vec![sequence.clone()],
             lanes => (0..lanes).flat_map(|lane| colors(planner.lane(lane).sequence())).collect(),
         };
-        let oracles = parts.into_iter().map(Oracle::new).collect::<Result<_, _>>().or_bad_input()?;
+        let references =
+            parts.into_iter().map(ReferenceRenderer::new).collect::<Result<_, _>>().or_bad_input()?;
         let sensor = ImageSensor::new(&scenario.camera, scenario.seed);
         let late = DeferredPhotometric::new(sequence);
         let optics = Optics::new(&scenario.camera, scenario.seed);
-        Ok(Self { oracles, late, optics, sensor, planner, options })
+        Ok(Self { references, late, optics, sensor, planner, options })
     }
 
-    fn finished(&self, oracle: &Oracle, plan: FramePlan) -> Finished {
+    fn finished(&self, reference: &ReferenceRenderer, plan: FramePlan) -> Finished {
         let options = RenderOptions { key: Some(plan.ideal_view()), ..self.options.clone() };
         Finished {
-            frame: oracle.render(plan.frame, &options),
+            frame: reference.render(plan.frame, &options),
             plan,
             faces: Vec::new(),
             lod: LodSelection::default(),
@@ -205,7 +208,7 @@ fn planned(sequence: &Sequence) -> Arc<Sequence> {
 
 impl FrameSource for ReferenceSource {
     fn adapter(&self) -> String {
-        Oracle::describe()
+        ReferenceRenderer::describe()
     }
 
     fn planner(&self) -> &Planner {
@@ -226,7 +229,7 @@ impl FrameSource for ReferenceSource {
         for &frame in frames {
             let plans = self.planner.plans(frame).or_bad_input()?;
             if let [plan] = plans.as_slice() {
-                sink(self.finished(&self.oracles[0], plan.clone())).or_failed()?;
+                sink(self.finished(&self.references[0], plan.clone())).or_failed()?;
                 continue;
             }
             let rows = plans.first().map(|plan| self.planner.rows(plan)).unwrap_or_default();
@@ -234,7 +237,8 @@ impl FrameSource for ReferenceSource {
                 let others: Vec<FramePlan> = plan.other_colors().collect();
                 std::iter::once(plan).chain(others)
             });
-            let parts = self.oracles.iter().zip(plans).map(|(oracle, plan)| self.finished(oracle, plan));
+            let parts =
+                self.references.iter().zip(plans).map(|(reference, plan)| self.finished(reference, plan));
             if let Some(mut whole) = join_parts(parts) {
                 whole.frame.rows = rows;
                 let exposure = whole.plan.exposure;

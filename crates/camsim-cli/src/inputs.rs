@@ -115,7 +115,7 @@ pub fn read_changed_rig(
     let scenario = read_changed(path, changes, console)?;
     let Some(index) = variation else {
         if scenario.is_random() {
-            console.note("[randomize] is left out: --variation K chooses values");
+            console.note("[randomize] is not applied: --variation K chooses values");
         }
         return Ok(scenario.into_base());
     };

@@ -26,7 +26,7 @@ impl Tolerances {
     /// reference renderer, which has no plan.
     pub fn new(quality: &QualitySpec) -> Option<Self> {
         let is_explicit = quality.preset == Preset::Paper
-            || matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle));
+            || matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Reference));
         let exceeded = |key, unit, tolerance| Exceeded { key, unit, tolerance, frames: 0, worst: None };
         (!is_explicit).then(|| Self {
             px: exceeded("quality.max_error_px", " px", quality.max_error_px),
@@ -110,7 +110,7 @@ impl OverlapCycles {
         Some(format!(
             "in {frames} of {total} frames blended triangles overlap in cycles, so that up to {most} (frame \
              {frame}) are blended in the wrong order, which is not predicted; `camsim verify SCENARIO.toml \
-             --pictures --frames {frame}` measures it, and quality.solver = \"oracle\" avoids it"
+             --pictures --frames {frame}` measures it, and quality.solver = \"reference\" avoids it"
         ))
     }
 }
@@ -178,7 +178,7 @@ mod tests {
             |solver| Tolerances::new(&QualitySpec { solver, ..QualitySpec::default() }).is_some();
         assert!(has_warnings(Auto::Auto) && has_warnings(Auto::Value(Solver::Reproject)));
         assert!(
-            ![Solver::Linear, Solver::Rk2, Solver::Oracle]
+            ![Solver::Linear, Solver::Rk2, Solver::Reference]
                 .into_iter()
                 .any(|solver| has_warnings(Auto::Value(solver)))
         );

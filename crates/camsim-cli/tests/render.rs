@@ -242,7 +242,7 @@ fn reference_renders_without_an_adapter() {
     assert!(code == 0 && out.starts_with("3 frames in"), "{out}{err}");
     for shard in ["2/2", "1/2"] {
         let (code, out, err) =
-            render(&parts, &["--frames", "2..5", "--shard", shard, "--set", "quality.solver=oracle"]);
+            render(&parts, &["--frames", "2..5", "--shard", shard, "--set", "quality.solver=reference"]);
         assert!(code == 0, "{out}{err}");
     }
     fs::remove_file(parts.join("depth/frame_000003.exr")).unwrap();
@@ -259,7 +259,7 @@ fn reference_renders_without_an_adapter() {
         run["adapter"].as_str().is_some_and(|adapter| adapter.starts_with("reference (f64 rays, ")),
         "{run}"
     );
-    assert_eq!(run["scenario"]["quality"]["solver"], "oracle");
+    assert_eq!(run["scenario"]["quality"]["solver"], "reference");
 
     // Scenarios that name methods are refused, because the reference renderer would ignore them.
     for (more, wanted) in [
@@ -274,7 +274,8 @@ fn reference_renders_without_an_adapter() {
             render(&refused, &[&["--frames", "2", "--backend", "reference"], &more[..]].concat());
         assert!(code == 2 && err.contains(wanted) && !refused.exists(), "{more:?}: {code} {err}");
     }
-    let (code, _, err) = render(&folder("refused"), &["--preset", "paper", "--set", "quality.solver=oracle"]);
+    let (code, _, err) =
+        render(&folder("refused"), &["--preset", "paper", "--set", "quality.solver=reference"]);
     assert!(code == 2 && err.contains("quality.solver: is rk2"), "{err}");
 }
 

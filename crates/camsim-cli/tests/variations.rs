@@ -136,7 +136,7 @@ fn values_are_fixed_by_set_and_read_by_other_commands() {
     let (code, out, err) = explain(&["--variation", "3"]);
     assert_eq!(code, 0, "{err}");
     assert_ne!(out, explain(&["--variation", "4"]).1);
-    assert!(explain(&[]).2.contains("[randomize] is left out: --variation K chooses values"));
+    assert!(explain(&[]).2.contains("[randomize] is not applied: --variation K chooses values"));
     let out = base.path().join("out");
     let (code, _, err) = render(
         &scenario,

@@ -141,8 +141,8 @@ impl<'a> Pipeline<'a> {
             return Err(ApplyError::PointSpread);
         }
         let solver = settings.solver.unwrap_or(if paper { Solver::Rk2 } else { Solver::Reproject });
-        if solver == Solver::Oracle {
-            return Err(ApplyError::Oracle);
+        if solver == Solver::Reference {
+            return Err(ApplyError::Reference);
         }
         let flow = match motion {
             Motion::Flow(flow) => {

@@ -38,7 +38,7 @@
 //! | [`distribution`] | drawn numbers of random scenarios |
 //! | [`apply`] | the reverse pipeline on ideal frames of any origin |
 //! | [`frame`], [`metrics`], [`silhouette`] | finished frames, and measures of their errors |
-//! | [`reference`](mod@reference) | the oracle, a renderer by f64 rays |
+//! | [`reference`](mod@reference) | the reference renderer, by f64 rays |
 //! | [`transfer`] | transfer functions of means and samples |
 //! | [`simd`] | vector instructions beyond the baseline of the target |
 //!

@@ -15,7 +15,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use crate::{camera::CameraError, mount::MountError, reference::OracleError, transfer::sinc};
+use crate::{camera::CameraError, mount::MountError, reference::ReferenceError, transfer::sinc};
 
 /// Bins a pixel.
 const BINS: f64 = 4.0;
@@ -53,7 +53,7 @@ pub enum EdgeError {
     Mount(#[from] MountError),
     /// The reference renderer.
     #[error(transparent)]
-    Oracle(#[from] OracleError),
+    Reference(#[from] ReferenceError),
     /// Nothing to render the edge in.
     #[error("there is no square of {0} x {0} pixels with rays in the middle of the picture")]
     NoRays(u32),

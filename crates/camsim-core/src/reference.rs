@@ -1,8 +1,8 @@
-//! The oracle: a reference renderer that casts every ray in f64, at the instant of its own row, from the
-//! trajectory into the scene. It is slow, exact and independent of the other renderers.
+//! The reference renderer, *the reference* in comments and tests: it casts every ray in f64, at the instant of
+//! its own row, from the trajectory into the scene. It is slow, exact and independent of the other renderers.
 //!
 //! It shares with them the scenario, the trajectory (with the mount), the motions of what moves, the forward
-//! model of the lens, and what docs/accuracy/oracle.md lists. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
+//! model of the lens, and what docs/accuracy/reference.md lists. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
 //! `terrain_pyramid`, `mesh_bvh`, `moving`), shadows (`shadow`), colour (`shading`) and integration (`render`)
 //! are implementations of its own. The seeded photometric stage is shared, because a seed has no meaning
 //! other than its noise. The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these
@@ -64,9 +64,9 @@ pub use truth::{DEPTH_TOLERANCE, TruthErrors, truth_errors};
 /// Number of zoomed lenses that are cached: as many as there may be frames rendered in turn.
 const ZOOM_CACHE_SIZE: usize = 4;
 
-/// Why the oracle cannot be built for a sequence.
+/// Why the reference cannot be built for a sequence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum OracleError {
+pub enum ReferenceError {
     /// The camera or an entry of its zoom table.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -77,7 +77,7 @@ pub enum OracleError {
 
 /// The reference renderer of one sequence. Immutable; shared between threads.
 #[derive(Debug)]
-pub struct Oracle {
+pub struct ReferenceRenderer {
     sequence: Arc<Sequence>,
     timing: FrameTiming,
     /// `None` for a zoom lens.
@@ -131,7 +131,7 @@ pub struct Hit {
 /// One frame, with the data that all its samples share.
 #[derive(Debug)]
 pub struct FrameView<'a> {
-    oracle: &'a Oracle,
+    reference: &'a ReferenceRenderer,
     stamp_s: f64,
     exposure_s: f64,
     lens: FrameLens<'a>,
@@ -145,12 +145,12 @@ enum FrameLens<'a> {
     Invalid,
 }
 
-impl Oracle {
-    /// Prepares the oracle of a sequence.
+impl ReferenceRenderer {
+    /// Prepares the reference of a sequence.
     ///
     /// # Errors
     /// A camera or shutter that cannot be used.
-    pub fn new(sequence: Arc<Sequence>) -> Result<Self, OracleError> {
+    pub fn new(sequence: Arc<Sequence>) -> Result<Self, ReferenceError> {
         let camera = &sequence.scenario.camera;
         // Called for its checks only; the values are not used.
         CameraModel::from_spec(camera)?;
@@ -217,18 +217,18 @@ impl Oracle {
     pub fn view(&self, frame: u64) -> FrameView<'_> {
         let stamp_s = self.timing.stamp_s(frame);
         let exposure_s = self.sequence.blurred_s(frame);
-        FrameView { oracle: self, stamp_s, exposure_s, lens: self.lens_of(stamp_s) }
+        FrameView { reference: self, stamp_s, exposure_s, lens: self.lens_of(stamp_s) }
     }
 
     /// Samples the position `pixel + offset_px` (offset within -0.5..=0.5) of a frame at exposure phase
     /// `phase` in [-0.5, 0.5]. The whole pixel is exposed at the time of its row. `None` where the lens has
-    /// no ideal ray. For many samples of a frame with a zoom lens, [`Oracle::view`] is faster.
+    /// no ideal ray. For many samples of a frame with a zoom lens, [`ReferenceRenderer::view`] is faster.
     #[must_use]
     pub fn sample(&self, frame: u64, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
         self.view(frame).sample(pixel, offset_px, phase)
     }
 
-    /// As [`Oracle::cast_at`] at path time 0, for scenes in which nothing moves.
+    /// As [`ReferenceRenderer::cast_at`] at path time 0, for scenes in which nothing moves.
     #[must_use]
     pub fn cast(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Hit> {
         self.cast_at(0.0, origin_ned_m, direction_ned)
@@ -260,13 +260,13 @@ impl Oracle {
     }
 
     /// Linear light of one hit, with fog by slant range. In a scene without blended surfaces and shadows this
-    /// is all the light of the ray; [`Oracle::radiance`] includes both.
+    /// is all the light of the ray; [`ReferenceRenderer::radiance`] includes both.
     #[must_use]
     pub fn color(&self, uv: DVec2, hit: Option<&Hit>) -> DVec3 {
         self.shading.color(hit, uv.extend(1.0).length())
     }
 
-    /// As [`Oracle::radiance_at`] at path time 0, for scenes in which nothing moves.
+    /// As [`ReferenceRenderer::radiance_at`] at path time 0, for scenes in which nothing moves.
     #[must_use]
     pub fn radiance(&self, pose: &CameraPose, uv: DVec2) -> DVec3 {
         self.radiance_at(0.0, pose, uv)
@@ -280,7 +280,7 @@ impl Oracle {
         self.radiance_along(t_s, pose.position_ned_m, pose.ned_from_camera * ray, ray.length())
     }
 
-    /// As [`Oracle::is_occluded_at`] at path time 0, for scenes in which nothing moves.
+    /// As [`ReferenceRenderer::is_occluded_at`] at path time 0, for scenes in which nothing moves.
     #[must_use]
     pub fn is_occluded(&self, from_ned_m: DVec3, to_ned_m: DVec3) -> bool {
         self.is_occluded_at(0.0, from_ned_m, to_ned_m)
@@ -313,7 +313,7 @@ impl Oracle {
 impl FrameView<'_> {
     /// Exposure time of a pixel, seconds.
     fn exposure_s(&self, pixel: [u32; 2]) -> f64 {
-        self.exposure_s + self.oracle.timing.longer_s(pixel)
+        self.exposure_s + self.reference.timing.longer_s(pixel)
     }
 
     /// Light that a pixel collects, as a multiple of that of the exposure of the row that is read first.
@@ -321,12 +321,12 @@ impl FrameView<'_> {
         if self.exposure_s > 0.0 { self.exposure_s(pixel) / self.exposure_s } else { 1.0 }
     }
 
-    /// As [`Oracle::sample`].
+    /// As [`ReferenceRenderer::sample`].
     #[must_use]
     pub fn sample(&self, pixel: [u32; 2], offset_px: DVec2, phase: f64) -> Option<RaySample> {
         let uv = self.ray(pixel, offset_px)?;
         let t_s = self.mid_s(pixel) + phase * self.exposure_s(pixel);
-        let pose = self.oracle.sequence.path.pose(t_s);
+        let pose = self.reference.sequence.path.pose(t_s);
         Some(RaySample { t_s, pose, uv, hit: self.hit(t_s, &pose, uv) })
     }
 
@@ -357,11 +357,11 @@ impl FrameView<'_> {
     /// Mid-exposure of a pixel, path time, seconds.
     #[must_use]
     pub fn mid_s(&self, pixel: [u32; 2]) -> f64 {
-        self.stamp_s + self.oracle.timing.dt_s(pixel)
+        self.stamp_s + self.reference.timing.dt_s(pixel)
     }
 
     fn hit(&self, t_s: f64, pose: &CameraPose, uv: DVec2) -> Option<Hit> {
-        self.oracle.cast_at(t_s, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
+        self.reference.cast_at(t_s, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
     }
 }
 

@@ -315,7 +315,7 @@ impl Resizing {
     }
 }
 
-/// The camera of the delivered picture: [`CameraSpec::resized`] applied, and left out. Without that key, the camera
+/// The camera of the delivered picture: [`CameraSpec::resized`] applied and removed. Without that key, the camera
 /// as it is.
 ///
 /// # Errors

@@ -361,7 +361,7 @@ impl ColorImage<'_> {
 
     /// Colour by a cubic spline, which blurs less than a bilinear read. Softness 0 is the Catmull-Rom spline;
     /// softness 1 is the cubic B-spline, whose variance is a third of a square pixel per axis; values between
-    /// mix weights and variance. The four corners of the 4x4 pixels are left out (at most 0.4 % each at
+    /// mix weights and variance. The four corners of the 4x4 pixels are skipped (at most 0.4 % each at
     /// softness 0, 0.8 % at 0.5). Overshoot is up to a tenth of the local contrast. Positions outside take
     /// the border pixel.
     #[must_use]

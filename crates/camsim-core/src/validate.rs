@@ -172,7 +172,7 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     }
     check.require(
         quality.iterations == Auto::Auto
-            || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle)),
+            || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Reference)),
         "quality.iterations",
         || "counts the depth look-ups of \"reproject\"; leave it out with any other quality.solver".into(),
     );

@@ -7,7 +7,7 @@ mod report;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    reference::OracleError,
+    reference::ReferenceError,
     scenario::{Auto, Solver},
     sequence::Sequence,
 };
@@ -28,7 +28,7 @@ const DEFAULT_FRAMES: u64 = 5;
 pub enum VerifyError {
     /// The reference renderer would be compared with itself.
     #[error(
-        "quality.solver is \"oracle\", the reference of this command: leave it out, or add --set \
+        "quality.solver is \"reference\", which this command compares with: leave it out, or add --set \
          quality.solver=auto"
     )]
     Solver,
@@ -46,7 +46,7 @@ pub enum VerifyError {
     },
     /// The reference renderer cannot be built.
     #[error(transparent)]
-    Oracle(#[from] OracleError),
+    Reference(#[from] ReferenceError),
     /// A frame cannot be planned or rendered.
     #[error(transparent)]
     Render(#[from] RenderError<Infallible>),
@@ -88,7 +88,7 @@ impl<'e> Verification<'e> {
         with_pictures: bool,
     ) -> Result<Self, VerifyError> {
         let scenario = &sequence.scenario;
-        if scenario.quality.solver == Auto::Value(Solver::Oracle) {
+        if scenario.quality.solver == Auto::Value(Solver::Reference) {
             return Err(VerifyError::Solver);
         }
         check_size(scenario.camera.size_px, engine.most_pixels_with_truth())?;

@@ -7,7 +7,7 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     auto_exposure::ExposureTrack,
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{AutoExposureSpec, Channel, ImageSensorSpec, Mosaic},
     scene::{Encoding, Mesh, Scene, Texture},
     sequence::Sequence,
@@ -83,11 +83,11 @@ fn rms(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn every_renderer_exposes_a_frame_as_the_reference_does() {
     let sequence = flight(None);
-    let oracle = Oracle::new(sequence.clone()).expect("an oracle");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
     let options = RenderOptions { tolerance_dn: 0.2, ..RenderOptions::default() };
     let mut times_s = Vec::new();
     for frame in [0, 40, 95] {
-        let exact = oracle.render(frame, &options);
+        let exact = reference.render(frame, &options);
         for backend in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
             let mut engine = engine();
             engine.set_backend(backend);
@@ -96,7 +96,7 @@ fn every_renderer_exposes_a_frame_as_the_reference_does() {
             assert_eq!(Some(exposure), sequence.exposure(frame));
             assert_eq!(found.plan.shutter.exposure_s(), exposure.time_s);
             times_s.push(exposure.time_s);
-            // `quality.max_error_dn`, and the oracle's own noise.
+            // `quality.max_error_dn`, and the reference's own noise.
             let error = rms(&found.frame, &exact) * 255.0;
             assert!(error < 1.0, "{frame} {backend:?}: {error}");
             let mean: f64 = found.frame.color_rgba().chunks_exact(4).map(|p| f64::from(p[1])).sum();

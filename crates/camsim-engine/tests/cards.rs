@@ -5,7 +5,7 @@ mod common;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Auto, Channel, MountSpec, Scenario},
     sequence::Sequence,
 };
@@ -49,9 +49,9 @@ fn rendered(engine: &Engine, sequence: &Arc<Sequence>) -> Finished {
 
 /// RMS error of a picture, 1/255 of the linear range.
 fn error_dn(finished: &Finished, sequence: &Arc<Sequence>) -> f64 {
-    let oracle = Oracle::new(sequence.clone()).expect("an oracle");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
     let options = RenderOptions { min_samples: 16, max_samples: 64, ..RenderOptions::default() };
-    let exact = oracle.render(FRAME, &options);
+    let exact = reference.render(FRAME, &options);
     let pairs = finished.frame.color_rgba().iter().zip(exact.color_rgba());
     let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
     255.0 * (squares / exact.color_rgba().len() as f64).sqrt()

@@ -11,7 +11,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::{Photometry, photometric},
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{
         Channel, ChromaticSpec, Face, ImageCircleSpec, LensModel, LensSpec, MountSpec, OutputEncoding,
         Primary, PrimaryLensSpec, Scenario, VignettingSpec,
@@ -51,9 +51,9 @@ fn over_city(edit: impl FnOnce(&mut Scenario)) -> Arc<Sequence> {
     sequence(scenario, flight, city(6))
 }
 
-fn oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
+fn reference(sequence: &Arc<Sequence>) -> RenderedFrame {
     let options = RenderOptions { min_samples: 64, max_samples: 256, ..RenderOptions::default() };
-    Oracle::new(sequence.clone()).expect("an oracle").render(FRAME, &options)
+    ReferenceRenderer::new(sequence.clone()).expect("a reference").render(FRAME, &options)
 }
 
 /// PSNR of each colour over the pixels that are valid in both, dB, and the number of those valid in one alone.
@@ -74,8 +74,8 @@ fn chromatic_pictures_are_those_of_the_reference() {
     let [plain, chromatic] = [None, fringes()].map(|fringes| over_city(|s| s.camera.chromatic = fringes));
     let channels = [Channel::Color, Channel::Depth];
     let done = render(&engine, &chromatic, &channels, FRAME);
-    let (with, differ) = psnr_db(&done.frame, &oracle(&chromatic));
-    let (without, _) = psnr_db(&render(&engine, &plain, &channels, FRAME).frame, &oracle(&plain));
+    let (with, differ) = psnr_db(&done.frame, &reference(&chromatic));
+    let (without, _) = psnr_db(&render(&engine, &plain, &channels, FRAME).frame, &reference(&plain));
     println!("{with:.1?} dB with fringes, {without:.1?} without, {differ} pixels valid in one alone");
     assert!(differ <= 3, "{differ}");
     let predicted_dn = done.plan.predicted.picture_dn();
@@ -85,7 +85,7 @@ fn chromatic_pictures_are_those_of_the_reference() {
         assert!(db > 48.0 && error_dn <= predicted_dn, "{db} dB");
     }
     // It is not the picture of one lens.
-    let (apart, _) = psnr_db(&done.frame, &oracle(&plain));
+    let (apart, _) = psnr_db(&done.frame, &reference(&plain));
     assert!(apart[0] < 35.0 && apart[2] < 35.0 && apart[1] > 47.0, "{apart:?}");
     // Truth is that of green's rays.
     let depth = |sequence| {
@@ -113,8 +113,8 @@ fn a_lens_of_its_own_is_that_of_a_camera_with_it() {
         s.camera.principal_point_px = red.principal_point_px;
     });
     let frame = render(&engine, &chromatic, &[Channel::Color], FRAME).frame;
-    let [red_db, _, _] = psnr_db(&frame, &oracle(&alone)).0;
-    let [_, green_db, blue_db] = psnr_db(&frame, &oracle(&over_city(|_| {}))).0;
+    let [red_db, _, _] = psnr_db(&frame, &reference(&alone)).0;
+    let [_, green_db, blue_db] = psnr_db(&frame, &reference(&over_city(|_| {}))).0;
     assert!(red_db > 47.0 && green_db > 47.0 && blue_db > 47.0, "{red_db} {green_db} {blue_db}");
 }
 
@@ -243,7 +243,7 @@ fn colors_of_a_wide_field_have_borders_of_faces_of_their_own() {
     let mut counts = [0_u32; 3];
     for (face, primary) in parts {
         let part = Arc::new(sequence.face(face).primary(primary));
-        let exact = Oracle::new(part).expect("an oracle").render(FRAME, &options);
+        let exact = ReferenceRenderer::new(part).expect("a reference").render(FRAME, &options);
         let k = primary.channel();
         for (got, wanted) in frame.color_rgba().chunks_exact(4).zip(exact.color_rgba().chunks_exact(4)) {
             if wanted[3] > 0.0 && got[3] > 0.0 {
@@ -307,7 +307,7 @@ fn luminance_and_colored_gains_are_those_of_all_colors() {
     // Plans depend on how much light counts, and pictures differ within their tolerance of 1/255.
     let rms = squares.map(|sum: f64| (sum / (3.0 * 160.0 * 120.0)).sqrt());
     assert!(rms.into_iter().all(|rms| rms < 1.0 / 255.0), "{rms:?}");
-    let exact = [oracle(&grey_of), oracle(&colored_of)];
+    let exact = [reference(&grey_of), reference(&colored_of)];
     for (got, exact) in [grey, colored].iter().zip(&exact) {
         let (psnr, _) = psnr_db(got, exact);
         assert!(psnr.into_iter().all(|db| db > 47.0), "{psnr:?}");
@@ -345,6 +345,6 @@ fn light_falls_as_the_model_says_in_all_renderers() {
             assert!((f64::from(got[k]) - weight * f64::from(plain[k])).abs() < 2e-3, "{x}, {y}");
         }
     }
-    let (psnr, _) = psnr_db(&falling_frame, &oracle(&falling));
+    let (psnr, _) = psnr_db(&falling_frame, &reference(&falling));
     assert!(psnr.into_iter().all(|db| db > 48.0), "{psnr:?}");
 }

@@ -5,7 +5,7 @@ mod common;
 use std::{path::PathBuf, sync::Arc};
 
 use camsim_core::{
-    reference::{Oracle, TruthErrors, truth_errors},
+    reference::{ReferenceRenderer, TruthErrors, truth_errors},
     scenario::{Channel, FieldOr, MountSpec, Readout, Scenario, ShutterSpec, Silhouettes},
     scene::{Encoding, Scene, Terrain, Texture},
     sequence::Sequence,
@@ -41,8 +41,8 @@ fn hills() -> Scene {
 }
 
 fn errors(sequence: &Arc<Sequence>, done: &Finished) -> TruthErrors {
-    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
-    truth_errors(&oracle, done.plan.frame, &done.frame, NEAR_PX).expect("depth of the sequence's size")
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
+    truth_errors(&reference, done.plan.frame, &done.frame, NEAR_PX).expect("depth of the sequence's size")
 }
 
 #[test]

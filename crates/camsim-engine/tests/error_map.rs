@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     noise::pcg4d,
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{Auto, Axis, Channel, LensModel, LensSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
@@ -186,8 +186,8 @@ fn pixel_errors_are_within_the_neighbouring_predictions() {
         let planner =
             Planner::new(sequence.clone(), &[Channel::Color, Channel::Coords], 16_384).expect("a planner");
         let map = planner.error_map(&done.plan).expect("a map");
-        let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
-        let view = oracle.view(0);
+        let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
+        let view = reference.view(0);
         let key = done.plan.ideal_view();
         let coords = done.frame.coords().expect("asked for");
         let (mut within, mut all, mut apart, mut least_px, mut most_px) = (0, 0, 0, f64::INFINITY, 0.0_f64);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use camsim_core::{
     camera::CameraModel,
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, Face, LensModel, LensSpec},
     scene::{Encoding, Scene},
     sequence::Sequence,
@@ -51,11 +51,12 @@ fn pixels() -> impl Iterator<Item = (usize, DVec2)> {
 }
 
 /// What the reference renderer casts for each face, in one frame.
-fn oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
+fn reference(sequence: &Arc<Sequence>) -> RenderedFrame {
     let options =
         RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.15, ..RenderOptions::default() };
-    let frames = Face::ALL
-        .map(|face| Oracle::new(Arc::new(sequence.face(face))).expect("an oracle").render(FRAME, &options));
+    let frames = Face::ALL.map(|face| {
+        ReferenceRenderer::new(Arc::new(sequence.face(face))).expect("a reference").render(FRAME, &options)
+    });
     let [mut whole, others @ ..] = frames;
     for (i, _) in pixels() {
         if let Some(other) = others.iter().find(|other| other.color_rgba()[4 * i + 3] > 0.0) {
@@ -71,7 +72,7 @@ fn a_wide_frame_has_every_pixel_and_no_seam() {
     let camera = CameraModel::from_spec(&sequence.scenario.camera).expect("a camera");
     let done = render(&Engine::cpu(), &sequence, &[Channel::Color], FRAME);
     assert_eq!(done.plans().count(), 6, "the corners see the back");
-    let expected = oracle(&sequence);
+    let expected = reference(&sequence);
     let face = |pixel: DVec2| direction(&camera, pixel).map(Face::of);
     // Squares of errors, 1/255: at the faces' borders, and elsewhere.
     let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
@@ -103,7 +104,7 @@ fn truth_of_a_wide_frame_is_in_the_axes_of_the_whole_camera() {
     let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).expect("a shutter");
     let channels = [Channel::Depth, Channel::Range, Channel::Normal, Channel::Flow];
     let frame = render(&Engine::cpu(), &sequence, &channels, FRAME).frame;
-    let oracle = Oracle::new(sequence.clone()).expect("an oracle");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
     let depth_m = frame.depth_m().expect("depth");
     let values = |channel| frame.floats(channel).expect("a plane");
     let at = |number: u64, pixel: DVec2| {
@@ -115,7 +116,9 @@ fn truth_of_a_wide_frame_is_in_the_axes_of_the_whole_camera() {
     for (i, pixel) in pixels().step_by(7) {
         let Some(direction) = direction(&camera, pixel) else { continue };
         let (_, pose) = at(FRAME, pixel);
-        let Some(hit) = oracle.cast(pose.position_ned_m, pose.ned_from_camera * direction) else { continue };
+        let Some(hit) = reference.cast(pose.position_ned_m, pose.ned_from_camera * direction) else {
+            continue;
+        };
         points += 1;
         let (range_m, cosine) = (hit.depth_m, direction.z);
         assert!((f64::from(values(Channel::Range)[i]) / range_m - 1.0).abs() < 1e-5, "{pixel}");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::{PlaneValues, RenderedFrame},
-    reference::{FlowErrors, Oracle, RenderOptions, coverage_errors, flow_errors},
+    reference::{FlowErrors, ReferenceRenderer, RenderOptions, coverage_errors, flow_errors},
     scenario::{Channel, FieldOr, FlowInstant, FlowState, MountSpec, Readout, Scenario},
     scene::{Encoding, Mesh, Scene, SceneObject, Terrain, Texture},
     sequence::Sequence,
@@ -78,17 +78,17 @@ fn readouts() -> [Change; 5] {
     ]
 }
 
-fn errors(oracle: &Oracle, frame: &RenderedFrame) -> Vec<FlowErrors> {
-    flow_errors(oracle, FRAME, frame, NEAR_PX, usize::MAX)
+fn errors(reference: &ReferenceRenderer, frame: &RenderedFrame) -> Vec<FlowErrors> {
+    flow_errors(reference, FRAME, frame, NEAR_PX, usize::MAX)
 }
 
 #[test]
 fn flows_are_those_of_the_reference_renderer() {
     for (name, change) in readouts() {
         let sequence = camera(change, hills());
-        let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+        let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
         let frame = render(&Engine::cpu(), &sequence, &FLOWS, FRAME).frame;
-        let errors = errors(&oracle, &frame);
+        let errors = errors(&reference, &frame);
         assert_eq!(errors.iter().map(|of| of.channel).collect::<Vec<_>>(), FLOWS);
         for FlowErrors { channel, away, near, states, beyond, faults, .. } in errors {
             eprintln!("{name} {channel:?}: {away:?} {near:?} {beyond} {states:?}");
@@ -106,13 +106,13 @@ fn flows_are_those_of_the_reference_renderer() {
 #[test]
 fn the_reference_renderer_finds_no_fault_in_its_own_flows_and_each_that_is_planted() {
     let sequence = camera(|_| {}, hills());
-    let oracle = Oracle::new(sequence).expect("a usable camera");
+    let reference = ReferenceRenderer::new(sequence).expect("a usable camera");
     let channels = [&FLOWS[..], &[Channel::Coverage]].concat();
     let options = RenderOptions { channels, min_samples: 1, max_samples: 32, ..RenderOptions::default() };
-    let right = oracle.render(FRAME, &options);
+    let right = reference.render(FRAME, &options);
     // Planes are stored in single precision.
-    assert!(errors(&oracle, &right).iter().all(|of| of.beyond == 0 && of.away.max < 1e-3));
-    let coverage = coverage_errors(&oracle, FRAME, &right, 1000).expect("coverage");
+    assert!(errors(&reference, &right).iter().all(|of| of.beyond == 0 && of.away.max < 1e-3));
+    let coverage = coverage_errors(&reference, FRAME, &right, 1000).expect("coverage");
     assert!(coverage.faults == 0 && coverage.max < 1e-6 && coverage.pixels > 500, "{coverage:?}");
 
     let parts = |channel| match channel {
@@ -136,7 +136,7 @@ fn the_reference_renderer_finds_no_fault_in_its_own_flows_and_each_that_is_plant
             let PlaneValues::Float(values) = &mut plane.values else { continue };
             values[parts(channel) * i + component] += fault;
         }
-        let found = errors(&oracle, &wrong);
+        let found = errors(&reference, &wrong);
         let faults: Vec<u64> = found.iter().map(|of| of.faults).collect();
         let expected: Vec<u64> = found.iter().map(|of| u64::from(of.channel == channel)).collect();
         assert_eq!(faults, expected, "{channel:?} {component}");
@@ -146,7 +146,7 @@ fn the_reference_renderer_finds_no_fault_in_its_own_flows_and_each_that_is_plant
         let PlaneValues::Float(values) = &mut plane.values else { continue };
         values.iter_mut().skip(i).step_by(97).for_each(|value| *value = 0.5);
     }
-    assert!(coverage_errors(&oracle, FRAME, &wrong, 7000).expect("coverage").faults > 10);
+    assert!(coverage_errors(&reference, FRAME, &wrong, 7000).expect("coverage").faults > 10);
 }
 
 /// Bilinear value of a plane at a position, if its four pixels are valid by `accepts`.

@@ -34,7 +34,7 @@ fn closed_form(plan: &FramePlan, path: &CameraPath, [x, y]: [u32; 2], phase: f64
         return None;
     }
     let hit = pose.position_ned_m + depth_m * ray_ned;
-    // Two pixels of border are left out: there a bilinear depth tap meets the sky.
+    // Two pixels of border are skipped: there a bilinear depth tap meets the sky.
     let rim_m = 3.0 * depth_m / plan.ideal.focal_px.min_element();
     if hit.x.abs().max(hit.y.abs()) > 0.5 * WIDTH_M - rim_m {
         return None;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, ImageSensorSpec, Mosaic, ShutterSpec},
     scene::{Encoding, Mesh, Scene, Texture},
     sequence::Sequence,
@@ -54,7 +54,7 @@ fn glint(exposure_ms: f64, full_well_e: f64) -> Arc<Sequence> {
 fn by_all(sequence: &Arc<Sequence>) -> Vec<(String, RenderedFrame)> {
     // So short a flash is missed by a few samples.
     let options = RenderOptions { min_samples: 1024, max_samples: 1024, ..RenderOptions::default() };
-    let exact = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
+    let exact = ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options);
     let mut all = vec![("reference".to_owned(), exact)];
     for backend in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
         let mut engine = engine();

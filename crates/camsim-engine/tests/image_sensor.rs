@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, ImageSensorSpec, Mosaic, TwinSpec},
     scene::Scene,
     sequence::Sequence,
@@ -37,15 +37,15 @@ fn sky() -> Arc<Sequence> {
     sequence(scenario, steady(100.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene)
 }
 
-fn by_oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
-    Oracle::new(sequence.clone()).expect("an oracle").render(0, &RenderOptions::default())
+fn by_reference(sequence: &Arc<Sequence>) -> RenderedFrame {
+    ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &RenderOptions::default())
 }
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn every_renderer_gives_the_same_numbers() {
     let sequence = sky();
-    let exact = by_oracle(&sequence);
+    let exact = by_reference(&sequence);
     let expected = exact.raw().expect("a raw picture");
     assert_eq!((expected.channels, expected.values.len()), (1, 80 * 60));
     for backend in [Backend::Cpu, Backend::GpuThenCpu, Backend::Gpu] {
@@ -66,7 +66,7 @@ fn a_twin_without_noise_keeps_its_exposure() {
     let twin = sequence
         .twin(&TwinSpec { name: "ideal".into(), ideal: true, ..TwinSpec::default() }, None)
         .expect("a twin");
-    let frame = by_oracle(&Arc::new(twin));
+    let frame = by_reference(&Arc::new(twin));
     let levels = [0.25_f32, 0.5, 0.75];
     let raw = frame.raw().expect("a raw picture");
     // Green, red; blue, green.

@@ -6,7 +6,7 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions, coord_errors, disocclusion, image_errors, silhouettes},
+    reference::{ReferenceRenderer, RenderOptions, coord_errors, disocclusion, image_errors, silhouettes},
     scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec},
     sequence::Sequence,
 };
@@ -156,12 +156,12 @@ fn sources_and_depths_over_buildings_are_exact() {
             sequence.scenario.quality.max_error_px = 1e-3;
             let sequence = Arc::new(sequence);
             let done = render_at_phase(engine, &sequence, &ALL, 0, phase as f32);
-            let oracle = Oracle::new(sequence).expect("a usable camera");
+            let reference = ReferenceRenderer::new(sequence).expect("a usable camera");
             let errors =
-                coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1)
+                coord_errors(&reference, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1)
                     .expect("coords were asked for");
-            unseen += disocclusion(&oracle, done.plan.frame, &done.plan.key_poses(), &[phase]).hidden;
-            let depth_off = worst_depth(&oracle, &done.frame);
+            unseen += disocclusion(&reference, done.plan.frame, &done.plan.key_poses(), &[phase]).hidden;
+            let depth_off = worst_depth(&reference, &done.frame);
             eprintln!(
                 "{name}, {who}: {} keys, rms {:.1e} px, at silhouettes {:.1e} px, max {:.1e} px, depth \
                  {depth_off:.1e}",
@@ -183,9 +183,9 @@ fn sources_and_depths_over_buildings_are_exact() {
 }
 
 /// Largest relative error of depth, 1 where only one of the two is sky.
-fn worst_depth(oracle: &Oracle, frame: &RenderedFrame) -> f64 {
+fn worst_depth(reference: &ReferenceRenderer, frame: &RenderedFrame) -> f64 {
     let found = frame.depth_m().expect("depth was asked for");
-    let view = oracle.view(frame.index);
+    let view = reference.view(frame.index);
     let off = |(i, found): (u32, &f32)| {
         let pixel = [i % frame.size_px[0], i / frame.size_px[0]];
         let true_m =
@@ -199,10 +199,10 @@ fn worst_depth(oracle: &Oracle, frame: &RenderedFrame) -> f64 {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn second_key_frame_fills_disocclusions() {
     let (name, flight) = &FLIGHTS[5];
-    let oracle = Oracle::new(flight.sequence(Auto::Auto, 1.0)).expect("a usable camera");
-    let truth =
-        oracle.render(0, &RenderOptions { tolerance_dn: 1.0, max_samples: 128, ..RenderOptions::default() });
-    let near = silhouettes(&oracle, 0, &[0.0]);
+    let reference = ReferenceRenderer::new(flight.sequence(Auto::Auto, 1.0)).expect("a usable camera");
+    let truth = reference
+        .render(0, &RenderOptions { tolerance_dn: 1.0, max_samples: 128, ..RenderOptions::default() });
+    let near = silhouettes(&reference, 0, &[0.0]);
     for (who, engine) in both_engines() {
         let [one, two] = [Auto::Value(1), Auto::Auto].map(|keys| {
             let done = render(&engine, &flight.sequence(keys, 0.5), &[Channel::Color], 0);

@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{CameraSpec, Channel, FieldOr, LensModel, LensSpec, Readout, ShutterSpec},
     scene::{Encoding, Mesh, Scene, Texture, Wrap},
     sequence::Sequence,
@@ -75,7 +75,7 @@ fn small_lamps_have_their_light() {
     for (streak_px, above_m) in [(0.0, 0.0), (3.0, 5.0), (30.0, 5.0)] {
         for side_px in SIDES_PX {
             let sequence = lamps(side_px, streak_px, above_m, |_| {});
-            let exact = Oracle::new(sequence.clone()).expect("an oracle");
+            let exact = ReferenceRenderer::new(sequence.clone()).expect("a reference");
             let exact = fractions(exact.render(0, &RenderOptions::default()).color_rgba(), side_px);
             eprintln!("{side_px} px, streak {streak_px} px, {above_m} m, reference: {exact:.3?}");
             // Its samples are 1024 a pixel: 256 in all meet a lamp of half a pixel, with 6 % for random ones.
@@ -106,7 +106,7 @@ fn small_lamps_have_their_light_through_a_lens_and_a_readout() {
                 (camera.shutter, camera.lens) = (shutter.clone(), lens.clone());
             });
             let options = RenderOptions { max_samples: 4096, ..RenderOptions::default() };
-            let exact = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
+            let exact = ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options);
             let exact = fractions(exact.color_rgba(), side_px);
             for backend in [Backend::Cpu, Backend::Gpu] {
                 let mut engine = engine();

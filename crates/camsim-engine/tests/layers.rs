@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Auto, Channel, MountSpec, Preset},
     scene::{Encoding, Light, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
@@ -63,19 +63,19 @@ fn seen_from_above(scene: Scene, velocity_ned_m_s: DVec3) -> Arc<Sequence> {
     sequence(scenario, steady(HEIGHT_M, 0.0, velocity_ned_m_s, DVec3::ZERO), scene)
 }
 
-/// Of the device and of the oracle.
+/// Of the device and of the reference.
 struct Pictures {
     colors: [Vec<f32>; 2],
     depths_m: [Vec<f32>; 2],
     plan: FramePlan,
 }
 
-/// Of the renderer, gpu or cpu, that is farther from the oracle.
+/// Of the renderer, gpu or cpu, that is farther from the reference.
 fn pictures(sequence: &Arc<Sequence>) -> Pictures {
     let channels = [Channel::Color, Channel::Depth];
     let options =
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
-    let truth = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
+    let truth = ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options);
     let by = |engine: &Engine| {
         let done = render(engine, sequence, &channels, 0);
         let depths_m = [&done.frame, &truth].map(|frame| frame.depth_m().expect("depth").to_vec());
@@ -98,7 +98,7 @@ impl Pictures {
 
     /// In the middle; half precision is 1/2048 of a value, for each layer.
     fn expect_in_the_middle(&self, name: &str, expected: DVec3, depth_m: f64) {
-        for (k, who) in ["device", "oracle"].into_iter().enumerate() {
+        for (k, who) in ["device", "reference"].into_iter().enumerate() {
             let (at, picture) = (60 * 160 + 80, &self.colors[k]);
             let found =
                 DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(picture[4 * at + channel])));

@@ -6,7 +6,7 @@ use std::convert::Infallible;
 
 use camsim_core::{
     lens::{GridOf, Lens, LensGrid, LensModel, RayChart},
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, LensSpec, LoadedFile, MountSpec, Scenario},
 };
 use camsim_engine::Engine;
@@ -84,9 +84,9 @@ fn every_model_shows_what_the_reference_renderer_shows() {
         };
         session.render::<Infallible>([2], &mut keep).expect("rendered");
         let frame = found.expect("one frame").frame;
-        let oracle = Oracle::new(sequence.clone()).expect("an oracle");
+        let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
         let options = RenderOptions { min_samples: 16, max_samples: 64, ..RenderOptions::default() };
-        let exact = oracle.render(2, &options);
+        let exact = reference.render(2, &options);
         let pixels = || frame.color_rgba().chunks_exact(4).zip(exact.color_rgba().chunks_exact(4));
         let both = pixels().filter(|(a, b)| a[3] > 0.0 && b[3] > 0.0).count();
         let differ = pixels().filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();

@@ -1,4 +1,4 @@
-//! Fewer triangles for what is small: the device with them against the oracle, which never has them.
+//! Fewer triangles for what is small: the device with them against the reference, which never has them.
 //!
 //! What rules it is `quality.max_terrain_error_px`: a quarter of it is how far a model's surface, with its
 //! colours, may be displaced in the picture, however fine the ideal frame is.
@@ -9,7 +9,7 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use camsim_core::{
     pose::CameraPose,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Auto, Channel, MountSpec},
     scene::{Encoding, Light, Mesh, MeshVertex, ModelLod, Scene, SceneLods, Shape, Texture, Wrap},
 };
@@ -135,7 +135,7 @@ fn draw(scene: &Scene, max_terrain_error_px: f64) -> (Drawn, Drawn) {
     };
     let options =
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.5, ..RenderOptions::default() };
-    let truth = Oracle::new(sequence).expect("an oracle").render(0, &options);
+    let truth = ReferenceRenderer::new(sequence).expect("a reference").render(0, &options);
     (
         device,
         Drawn {
@@ -174,7 +174,7 @@ fn by_displacement(rgba: &[f32], error_px: f64) -> f64 {
 }
 
 /// How far depths are from those with all triangles where the sphere that a pixel sees is turned by at most
-/// 60 degrees, as the oracle knows.
+/// 60 degrees, as the reference knows.
 fn farthest_depth_m(scene: &Scene, found: &Drawn, full: &Drawn, truth: &Drawn) -> f64 {
     let mut farthest_m = 0.0_f64;
     for (i, truth_m) in truth.depth_m.iter().map(|depth_m| f64::from(*depth_m)).enumerate() {
@@ -217,7 +217,7 @@ fn check(name: &str, light: Option<Light>) {
         [&full, &some].map(|drawn| -20.0 * rms(&drawn.color_rgba, &truth.color_rgba).log10());
     eprintln!(
         "{name}: {} of {} triangles, within {:.4} m or {:.4} px; depth off by {apart_m:.4} m; picture by \
-         {:.2}/255 RMS of {:.2}/255; {db_some:.1} dB against the oracle, {db_full:.1} dB with all triangles",
+         {:.2}/255 RMS of {:.2}/255; {db_some:.1} dB against the reference, {db_full:.1} dB with all triangles",
         some.detail.triangles,
         some.detail.finest_triangles,
         some.error_m,

@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, MountSpec},
     scene::{Encoding, Light, Mesh, MeshVertex, Scene, Shape, Terrain, Texture, Wrap},
     sequence::Sequence,
@@ -52,12 +52,13 @@ fn in_light(meshes: Vec<Mesh>, light: Option<Light>) -> Arc<Sequence> {
     seen_from_above(Scene { meshes, sky_linear: [0.1, 0.15, 0.4], light, ..Scene::default() })
 }
 
-/// The pictures of the renderer, gpu or cpu, that is farther from the oracle, and of the oracle, R G B A.
+/// The pictures of the renderer, gpu or cpu, that is farther from the reference, and of the reference, R G B A.
 fn pictures(sequence: &Arc<Sequence>) -> [Vec<f32>; 2] {
     let channels = [Channel::Color];
     let options =
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
-    let truth = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options).into_color();
+    let truth =
+        ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options).into_color();
     let by = |engine: &Engine| [render(engine, sequence, &channels, 0).frame.into_color(), truth.clone()];
     let both = [by(&gpu_engine()), by(&Engine::cpu())];
     both.into_iter().min_by(|a, b| psnr_db(a).total_cmp(&psnr_db(b))).expect("two")
@@ -71,7 +72,7 @@ fn psnr_db([a, b]: &[Vec<f32>; 2]) -> f64 {
 /// Checks the middle of the picture; half precision is 1/2048 of a value.
 fn expect_in_the_middle(name: &str, mesh: Mesh, light: Option<Light>, expected: DVec3) {
     let both = pictures(&in_light(vec![mesh], light));
-    for (who, picture) in ["device", "oracle"].into_iter().zip(&both) {
+    for (who, picture) in ["device", "reference"].into_iter().zip(&both) {
         let at = 4 * (60 * 160 + 80);
         let found =
             DVec3::new(f64::from(picture[at]), f64::from(picture[at + 1]), f64::from(picture[at + 2]));
@@ -212,7 +213,7 @@ fn lit_slope_matches_closed_form() {
     let sequence = seen_from_above(Scene { terrain: Some(terrain), light: Some(sun()), ..Scene::default() });
     let expected = DVec3::from_array(ALBEDO) * of_face(DVec3::new(-0.4, -0.3, -1.0).normalize());
     // The picture on the ground has 8 bits.
-    for (who, picture) in ["device", "oracle"].into_iter().zip(pictures(&sequence)) {
+    for (who, picture) in ["device", "reference"].into_iter().zip(pictures(&sequence)) {
         for pixel in picture.chunks_exact(4).step_by(37) {
             let found = DVec3::new(f64::from(pixel[0]), f64::from(pixel[1]), f64::from(pixel[2]));
             assert!(

@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, MountSpec},
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
 };
@@ -47,7 +47,7 @@ fn with_alpha(side: u32) -> Texture {
     Texture { size_px: [side, side], rgba8: rgba8.collect(), encoding: Encoding::Linear }
 }
 
-/// PSNR of the picture, of gpu or cpu, that is farther from the oracle's, and the fraction of pixels whose depth is another surface's.
+/// PSNR of the picture, of gpu or cpu, that is farther from the reference's, and the fraction of pixels whose depth is another surface's.
 fn compare(name: &str, meshes: Vec<Mesh>) -> (f64, f64) {
     let mut scenario = scenario();
     scenario.camera.size_px = [160, 120];
@@ -59,7 +59,7 @@ fn compare(name: &str, meshes: Vec<Mesh>) -> (f64, f64) {
     let channels = [Channel::Color, Channel::Depth];
     let options =
         RenderOptions { channels: channels.to_vec(), tolerance_dn: 0.25, ..RenderOptions::default() };
-    let truth = Oracle::new(sequence.clone()).expect("an oracle").render(0, &options);
+    let truth = ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options);
     let exact = truth.depth_m().expect("depth");
     let seen = exact.iter().filter(|depth| **depth > 0.0).count() as f64 / exact.len() as f64;
     let psnr_db = [("gpu", gpu_engine()), ("cpu", Engine::cpu())].map(|(who, engine)| {

@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, FieldOr, MountSpec, Preset, Readout, Scenario, ShutterSpec},
     scene::{
         Encoding, Mesh, RigidMotion, Scene, Terrain, Texture,
@@ -83,9 +83,9 @@ fn frames_with_moving_things_are_those_of_the_reference() {
     let (gpu, cpu) = (engine(), Engine::cpu());
     for (name, change) in cases {
         let with = camera(true, change);
-        let oracle = Oracle::new(with.clone()).expect("a usable camera");
+        let reference = ReferenceRenderer::new(with.clone()).expect("a usable camera");
         let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
-        let expected = oracle.render(FRAME, &options).into_color();
+        let expected = reference.render(FRAME, &options).into_color();
         let still = camera(false, change);
         for (renderer, engine) in [("cpu", &cpu), ("gpu", &gpu)] {
             let found = render(engine, &with, &[Channel::Color], FRAME).frame.into_color();
@@ -132,9 +132,9 @@ fn a_fast_rotor_is_seen_all_around_and_what_is_out_of_view_changes_nothing() {
         |sequence: &Arc<Sequence>| render(&cpu, sequence, &[Channel::Color], FRAME).frame.into_color();
     let without = frame(&camera(false, |_| {}));
     let rotor = with_rotor(DVec3::new(10.0, 0.0, -40.0));
-    let oracle = Oracle::new(rotor.clone()).expect("a usable camera");
+    let reference = ReferenceRenderer::new(rotor.clone()).expect("a usable camera");
     let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
-    let expected = oracle.render(FRAME, &options).into_color();
+    let expected = reference.render(FRAME, &options).into_color();
     let found = frame(&rotor);
     let (error_dn, _) = difference(&found, &expected);
     let (gone_dn, _) = difference(&found, &without);
@@ -153,13 +153,13 @@ fn a_fast_rotor_is_seen_all_around_and_what_is_out_of_view_changes_nothing() {
 #[test]
 fn truth_of_moving_things_is_that_of_rays_at_their_instant() {
     let with = camera(true, |_| {});
-    let oracle = Oracle::new(with.clone()).expect("a usable camera");
+    let reference = ReferenceRenderer::new(with.clone()).expect("a usable camera");
     let frame = render(&Engine::cpu(), &with, &[Channel::Depth, Channel::NormalWorld], FRAME).frame;
     let depth_m = frame.depth_m().expect("depth");
     let (mut of_roof, mut wrong) = (0, 0);
     for (i, found_m) in depth_m.iter().enumerate() {
         let pixel = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
-        let seen = oracle.sample(FRAME, pixel, DVec2::ZERO, 0.0).and_then(|seen| seen.hit);
+        let seen = reference.sample(FRAME, pixel, DVec2::ZERO, 0.0).and_then(|seen| seen.hit);
         let expected_m = seen.map_or(0.0, |hit| hit.depth_m);
         of_roof += usize::from(seen.is_some_and(|hit| hit.surface == 2));
         wrong += usize::from((f64::from(*found_m) - expected_m).abs() > 1e-4 * expected_m);

@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::Channel,
     scene::Scene,
     sequence::Sequence,
@@ -31,8 +31,8 @@ fn cameras_of_one_seed_have_independent_noise() {
     let of = |name: &str, backend: Option<Backend>| {
         let sequence = grey(name);
         let Some(backend) = backend else {
-            return Oracle::new(sequence)
-                .expect("an oracle")
+            return ReferenceRenderer::new(sequence)
+                .expect("a reference")
                 .render(0, &RenderOptions::default())
                 .into_color();
         };

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::{PlaneValues, RenderedFrame},
-    reference::{Oracle, PlaneErrors, RenderOptions, plane_errors},
+    reference::{PlaneErrors, ReferenceRenderer, RenderOptions, plane_errors},
     scenario::{Channel, MountSpec, Readout, Scenario},
     scene::{Encoding, Mesh, Scene, SceneObject, Terrain, Texture},
     sequence::Sequence,
@@ -66,8 +66,8 @@ fn over_hills(change: impl Fn(&mut Scenario)) -> Arc<Sequence> {
 }
 
 fn errors(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Vec<PlaneErrors> {
-    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
-    plane_errors(&oracle, 0, frame, NEAR_PX)
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
+    plane_errors(&reference, 0, frame, NEAR_PX)
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn every_value_belongs_to_a_visible_surface() {
 fn wrong_values_are_found() {
     let sequence = over_hills(|_| {});
     let options = RenderOptions { channels: CHANNELS.to_vec(), max_samples: 32, ..RenderOptions::default() };
-    let exact = Oracle::new(sequence.clone()).expect("a usable camera").render(0, &options);
+    let exact = ReferenceRenderer::new(sequence.clone()).expect("a usable camera").render(0, &options);
     for found in errors(&sequence, &exact) {
         let errors = (found.beyond, found.faults, found.max < 1e-6);
         assert_eq!(errors, (0, 0, true), "{found:?}");
@@ -129,9 +129,9 @@ fn wrong_values_are_found() {
 }
 
 /// Fraction of a pixel's rays that meet the object of its centre, by many rays of the reference renderer.
-fn fraction(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
-    let view = oracle.view(0);
-    let scene = &oracle.sequence().scene;
+fn fraction(reference: &ReferenceRenderer, pixel: [u32; 2], per_side: u32) -> f64 {
+    let view = reference.view(0);
+    let scene = &reference.sequence().scene;
     let object = |position: DVec2, phase: f64| {
         let hit = view.sample(pixel, position, phase).and_then(|sample| sample.hit);
         hit.map_or(0, |hit| scene.object_of_surface(hit.surface))
@@ -150,17 +150,17 @@ fn fraction(oracle: &Oracle, pixel: [u32; 2], per_side: u32) -> f64 {
 fn coverage_is_the_fraction_of_rays_that_see_the_object() {
     // 30 ms at 36 m/s, 60 m from the upper roof: it moves by two pixels.
     let sequence = over_hills(|scenario| scenario.camera.shutter = rolling(33.0, 30.0));
-    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
     let frame = render(&Engine::cpu(), &sequence, &[Channel::Coverage], 0).frame;
     let coverage = frame.floats(Channel::Coverage).expect("coverage");
     let (mut most, mut squares, mut mixed) = (0.0_f64, 0.0, 0.0);
     for (i, &coverage) in coverage.iter().enumerate() {
         let pixel = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
         if coverage < 1.0 {
-            let off = (f64::from(coverage) - fraction(&oracle, pixel, 12)).abs();
+            let off = (f64::from(coverage) - fraction(&reference, pixel, 12)).abs();
             (most, squares, mixed) = (most.max(off), squares + off * off, mixed + 1.0);
         } else if i % 3 == 0 {
-            let fraction = fraction(&oracle, pixel, 4);
+            let fraction = fraction(&reference, pixel, 4);
             assert!(fraction > 0.93, "{pixel:?}: {fraction}");
         }
     }

@@ -130,6 +130,6 @@ fn plumb_line_leans_by_rate_times_readout() {
     check(&demo, 26.0);
     match std::env::var_os("CAMSIM_DATA") {
         Some(data) => check(&Path::new(&data).join("camsim/path_lawnmower.csv"), 171.5),
-        None => eprintln!("CAMSIM_DATA is not set: the real flight is left out"),
+        None => eprintln!("CAMSIM_DATA is not set: the real flight is skipped"),
     }
 }

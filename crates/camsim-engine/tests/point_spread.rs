@@ -8,7 +8,7 @@ use camsim_core::{
     frame::RenderedFrame,
     imaging::Optics,
     metrics::{ImageView, compare},
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{CameraSpec, Channel, LensModel, LensSpec, PointSpreadSpec, Scenario, TwinSpec},
     sequence::Sequence,
 };
@@ -35,8 +35,8 @@ fn spread() -> PointSpreadSpec {
     PointSpreadSpec { sigma_px: Some(0.7), defocus_px: Some(2.5), glare: 0.1, ..PointSpreadSpec::default() }
 }
 
-fn by_oracle(sequence: &Arc<Sequence>) -> RenderedFrame {
-    Oracle::new(sequence.clone()).expect("an oracle").render(0, &RenderOptions::default())
+fn by_reference(sequence: &Arc<Sequence>) -> RenderedFrame {
+    ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &RenderOptions::default())
 }
 
 fn psnr_db(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
@@ -60,7 +60,7 @@ fn every_renderer_spreads_its_light() {
         })
     };
     let (sharp, blurred) = (with(None), with(Some(spread())));
-    let (exact_sharp, exact) = (by_oracle(&sharp), by_oracle(&blurred));
+    let (exact_sharp, exact) = (by_reference(&sharp), by_reference(&blurred));
     let valid = exact.color_rgba().chunks_exact(4).filter(|rgba| rgba[3] > 0.0).count();
     assert!((4000..96 * 72).contains(&valid), "some corners have no ray: {valid}");
     let change_db = psnr_db(&exact, &exact_sharp);
@@ -86,20 +86,23 @@ fn light_is_spread_once_and_noise_is_not() {
             scenario.camera.photometric.noise_sigma = 0.05;
         })
     };
-    let mut expected = by_oracle(&clean);
+    let mut expected = by_reference(&clean);
     Optics::new(&noisy(Some(spread())).scenario.camera, clean.scenario.seed)
         .expect("a point spread")
         .expose(&mut expected, None);
-    let found = by_oracle(&noisy(Some(spread())));
+    let found = by_reference(&noisy(Some(spread())));
     assert_eq!(found.color_rgba(), expected.color_rgba());
     // An ideal twin has neither; one without noise keeps the blur.
     let twin =
-        |twin: TwinSpec| by_oracle(&Arc::new(noisy(Some(spread())).twin(&twin, None).expect("a twin")));
+        |twin: TwinSpec| by_reference(&Arc::new(noisy(Some(spread())).twin(&twin, None).expect("a twin")));
     let without_noise = twin(TwinSpec { name: "clean".into(), noise: Some(false), ..TwinSpec::default() });
-    let mut blurred = by_oracle(&clean);
+    let mut blurred = by_reference(&clean);
     let camera = CameraSpec { point_spread: Some(spread()), ..clean.scenario.camera.clone() };
     Optics::new(&camera, 0).expect("a point spread").expose(&mut blurred, None);
     assert_eq!(without_noise.color_rgba(), blurred.color_rgba());
     let sharp = TwinSpec { noise: Some(false), point_spread: Some(false), ..TwinSpec::default() };
-    assert_eq!(twin(TwinSpec { name: "sharp".into(), ..sharp }).color_rgba(), by_oracle(&clean).color_rgba());
+    assert_eq!(
+        twin(TwinSpec { name: "sharp".into(), ..sharp }).color_rgba(),
+        by_reference(&clean).color_rgba()
+    );
 }

@@ -1,4 +1,4 @@
-//! Is the prediction honest? Random frames of three scenes: the error measured against the oracle is never
+//! Is the prediction honest? Random frames of three scenes: the error measured against the reference is never
 //! above the predicted one, and the predicted one is not far above it.
 //!
 //! `CAMSIM_LONG=1` tries all 200 frames; without it a fifth of them.
@@ -9,7 +9,7 @@ use std::{convert::Infallible, sync::Arc, time::Instant};
 
 use camsim_core::{
     noise::pcg4d,
-    reference::{CoordErrors, Oracle, coord_errors},
+    reference::{CoordErrors, ReferenceRenderer, coord_errors},
     scenario::{
         Auto, Axis, Channel, FieldOr, LensModel, LensSpec, Readout, Scenario, ShutterSpec, Solver,
         VibrationSpec,
@@ -170,7 +170,7 @@ struct Found {
 }
 
 fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
-    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords]).expect("session");
     session.set_looked_up_coords(true);
     let begin = Instant::now();
@@ -189,7 +189,7 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
         session.set_coords_phase(phase);
         let mut sink = |done: Finished| {
             let errors = coord_errors(
-                &oracle,
+                &reference,
                 done.plan.frame,
                 &done.plan.ideal_view(),
                 &done.frame,

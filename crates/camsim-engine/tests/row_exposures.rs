@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{
         Auto, Channel, LensModel, LensSpec, Readout, Reset, Scenario, ShutterSpec, Silhouettes, TwinSpec,
     },
@@ -63,10 +63,10 @@ fn check(engine: &Engine, scenario: Scenario) {
     let most_dn = scenario.quality.max_error_dn;
     let name = format!("{:?}", scenario.camera.shutter);
     let sequence = flown(scenario);
-    let oracle = Oracle::new(sequence.clone()).expect("an oracle");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
     let options =
         RenderOptions { channels: CHANNELS.to_vec(), tolerance_dn: 0.2, ..RenderOptions::default() };
-    let truth = oracle.render(0, &options);
+    let truth = reference.render(0, &options);
     let done = render(engine, &sequence, &CHANNELS, 0).frame;
     let off_dn = compared(&truth, &done);
     eprintln!("{off_dn:.3} dn, {:.1} dB: {name}", 20.0 * (255.0 / off_dn).log10());

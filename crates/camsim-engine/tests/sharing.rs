@@ -8,7 +8,7 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     mount::CameraPath,
     pose::BodyState,
-    reference::{Oracle, coord_errors},
+    reference::{ReferenceRenderer, coord_errors},
     scenario::{Axis, Channel, LensModel, LensSpec, MountSpec, ShutterSpec, VibrationSpec},
     sequence::Sequence,
     trajectory::Trajectory,
@@ -95,9 +95,9 @@ fn shared_ideal_frame_is_drawn_once_with_exact_sources() {
                     done.frame.color_rgba() == first.frame.color_rgba(),
                     "{name}, {frame}: asking for the truth changes no colour"
                 );
-                let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+                let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
                 let errors = coord_errors(
-                    &oracle,
+                    &reference,
                     done.plan.frame,
                     &done.plan.ideal_view(),
                     &done.frame,

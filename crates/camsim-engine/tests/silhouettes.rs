@@ -4,7 +4,7 @@
 mod common;
 
 use camsim_core::{
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
     scene::{Scene, Terrain},
     temporal::{edge_mask::edge_mask, supersampled::PixelCentre},
@@ -167,8 +167,8 @@ fn ridge_depths_belong_to_one_ridge() {
         let (name, velocity, turn) = *case;
         let sequence = sequence(scenario.clone(), steady(110.0, 0.0, velocity, turn), ridges());
         let done = render(engine, &sequence, &[Channel::Depth], 0);
-        let oracle = Oracle::new(sequence).expect("a usable camera");
-        let view = oracle.view(0);
+        let reference = ReferenceRenderer::new(sequence).expect("a usable camera");
+        let view = reference.view(0);
         let depths = done.frame.depth_m().expect("asked for");
         let (mut worst, mut sky) = (0.0_f64, 0);
         for (i, found) in (0..).zip(depths).map(|(i, found)| (i, f64::from(*found))) {
@@ -291,8 +291,8 @@ fn colours_do_not_depend_on_truth_channels() {
     assert_eq!((plain.plan.keys.len(), plain.plan.temporal), (both.plan.keys.len(), both.plan.temporal));
     assert!(plain.frame.color_rgba() == both.frame.color_rgba(), "depth changed colours");
     // What each pixel's own ray meets at mid-exposure, pixel by pixel.
-    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
-    let view = oracle.view(0);
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
+    let view = reference.view(0);
     let depth_m = both.frame.depth_m().expect("depth");
     let [width, height] = both.frame.size_px;
     let differs = |&(x, y): &(u32, u32)| {

@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
@@ -57,7 +57,8 @@ fn skyline_is_exact_from_a_distant_ideal_frame() {
             let mut engine = engine();
             engine.set_backend(backend);
             let done = common::render(&engine, &sequence, &[Channel::Color], 0);
-            let truth = Oracle::new(sequence).expect("oracle").render(0, &RenderOptions::default());
+            let truth =
+                ReferenceRenderer::new(sequence).expect("reference").render(0, &RenderOptions::default());
             rms_dn(done.frame.color_rgba(), truth.color_rgba())
         };
         for backend in [Backend::GpuThenCpu, Backend::Gpu] {
@@ -74,7 +75,8 @@ fn skyline_is_exact_from_a_distant_ideal_frame() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn skyline_search_agrees_with_its_twin() {
     let sequence = flying_past(0.0, 60.0);
-    let truth = Oracle::new(sequence.clone()).expect("oracle").render(0, &RenderOptions::default());
+    let truth =
+        ReferenceRenderer::new(sequence.clone()).expect("reference").render(0, &RenderOptions::default());
     for backend in [Backend::GpuThenCpu, Backend::Gpu] {
         let mut engine = engine();
         engine.set_backend(backend);
@@ -141,7 +143,7 @@ fn sky_coordinates_are_exact_beside_surfaces() {
             max_samples: 1,
             ..RenderOptions::default()
         };
-        let exact = Oracle::new(sequence.clone()).expect("oracle").render(0, &options);
+        let exact = ReferenceRenderer::new(sequence.clone()).expect("reference").render(0, &options);
         let (exact_coords, exact_depth_m) =
             (exact.coords().expect("asked for"), exact.depth_m().expect("asked for"));
         let (plan, coords, depth_m) =

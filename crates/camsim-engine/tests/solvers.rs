@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{CoordErrors, Oracle, coord_errors},
+    reference::{CoordErrors, ReferenceRenderer, coord_errors},
     scenario::{Auto, Axis, Channel, MountSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
@@ -165,9 +165,9 @@ fn errors_against_rays_cast_into_the_scene() {
             if let Auto::Value(iterations) = iterations {
                 assert_eq!(done.plan.temporal, TemporalStage::Reproject { iterations });
             }
-            let oracle = Oracle::new(sequence).expect("a camera");
+            let reference = ReferenceRenderer::new(sequence).expect("a camera");
             let errors: CoordErrors =
-                coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, 0.0, 1)
+                coord_errors(&reference, done.plan.frame, &done.plan.ideal_view(), &done.frame, 0.0, 1)
                     .expect("coords");
             let all = errors.all;
             eprintln!(

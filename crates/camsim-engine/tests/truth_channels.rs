@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     camera::CameraModel,
-    reference::{Oracle, RaySample},
+    reference::{RaySample, ReferenceRenderer},
     scenario::{
         Axis, Channel, FieldOr, FlowState, LensModel, LensSpec, MountSpec, Readout, Scenario, ShutterSpec,
         VibrationSpec,
@@ -56,7 +56,7 @@ fn camera(change: fn(&mut Scenario)) -> Arc<Sequence> {
 struct Case {
     name: &'static str,
     sequence: Arc<Sequence>,
-    oracle: Oracle,
+    reference: ReferenceRenderer,
     camera: CameraModel,
 }
 
@@ -70,9 +70,9 @@ fn cases() -> Vec<Case> {
     ];
     let case = |(name, change): (&'static str, fn(&mut Scenario))| {
         let sequence = camera(change);
-        let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+        let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
         let camera = CameraModel::from_spec(&sequence.scenario.camera).expect("a usable camera");
-        Case { name, sequence, oracle, camera }
+        Case { name, sequence, reference, camera }
     };
     changes.into_iter().map(case).collect()
 }
@@ -87,7 +87,7 @@ impl Case {
     }
 
     fn sample(&self, pixel: [u32; 2]) -> Option<RaySample> {
-        self.oracle.sample(FRAME, pixel, DVec2::ZERO, 0.0)
+        self.reference.sample(FRAME, pixel, DVec2::ZERO, 0.0)
     }
 
     /// Where the camera of an instant shows what a ray has met.
@@ -114,7 +114,7 @@ impl Case {
     fn read_s(&self, frame: u64, px: DVec2, shift: DVec2) -> f64 {
         let shutter = &self.sequence.scenario.camera.shutter;
         let [x, y] = (px + shift).to_array().map(|value| value.max(0.0));
-        let view = self.oracle.view(frame);
+        let view = self.reference.view(frame);
         let is_sideways = matches!(shutter.readout, Readout::LeftToRight | Readout::RightToLeft);
         let (across, last) = if is_sideways { (px.x, SIZE_PX[0] - 1) } else { (px.y, SIZE_PX[1] - 1) };
         let is_interlaced = shutter.interlace_ms == FieldOr::Field;
@@ -151,7 +151,7 @@ fn range_and_normal_are_those_of_rays() {
             let expected_m = hit.point_ned_m.distance(seen.pose.position_ned_m);
             // Two further points of the surface, a thousandth of a pixel away, make a plane.
             let beside = |offset| {
-                let beside = case.oracle.sample(FRAME, pixel, offset, 0.0)?.hit?;
+                let beside = case.reference.sample(FRAME, pixel, offset, 0.0)?.hit?;
                 (beside.surface == hit.surface).then_some(beside.point_ned_m - hit.point_ned_m)
             };
             let sides = beside(DVec2::new(1e-3, 0.0)).zip(beside(DVec2::new(0.0, 1e-3)));
@@ -192,9 +192,9 @@ fn flow_leads_to_where_the_other_frame_shows_the_point() {
                 largest_px = largest_px.max(expected_px.distance(to_px));
                 let pose = case.sequence.path.pose(read_s);
                 let is_hidden = match seen.hit {
-                    Some(hit) => case.oracle.is_occluded(pose.position_ned_m, hit.point_ned_m),
+                    Some(hit) => case.reference.is_occluded(pose.position_ned_m, hit.point_ned_m),
                     None => case
-                        .oracle
+                        .reference
                         .cast(pose.position_ned_m, seen.pose.ned_from_camera * seen.uv.extend(1.0))
                         .is_some(),
                 };
@@ -252,7 +252,7 @@ fn motion_and_blur_path_are_those_of_projections_at_other_instants() {
 /// Whether surfaces of other depths are within a twentieth of a pixel.
 fn is_at_silhouette(case: &Case, pixel: [u32; 2]) -> bool {
     let depth = |offset| {
-        case.oracle.sample(FRAME, pixel, offset, 0.0).and_then(|seen| seen.hit).map(|hit| hit.depth_m)
+        case.reference.sample(FRAME, pixel, offset, 0.0).and_then(|seen| seen.hit).map(|hit| hit.depth_m)
     };
     let offsets = [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y];
     let here = depth(DVec2::ZERO);

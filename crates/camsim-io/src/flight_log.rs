@@ -109,7 +109,7 @@ pub use page::page;
 pub struct RawLog {
     /// Rows, in the file's order.
     pub rows: Vec<RawRow>,
-    /// Notes about what was inferred, chosen, or left out.
+    /// Notes about what was inferred, chosen, or skipped.
     pub notes: Vec<Note>,
     /// How quaternions of a table were read; `None` of other files and other attitudes.
     quaternions: Option<attitude_check::QuaternionReading>,

@@ -329,7 +329,7 @@ pub fn read_terrain_in_light(
                 let (is, others) = match spec.beyond {
                     Beyond::Grey => ("grey", "\"edge\" or \"void\""),
                     Beyond::Edge => ("of the colours at its border", "\"grey\" or \"void\""),
-                    Beyond::Void => ("left out", "\"grey\" or \"edge\""),
+                    Beyond::Void => ("void", "\"grey\" or \"edge\""),
                 };
                 format!(
                     "{}: {fraction:.2} % of the terrain's area has no ortho-image and is {is} \

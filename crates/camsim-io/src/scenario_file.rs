@@ -112,7 +112,7 @@ pub enum ScenarioError {
 }
 
 /// Reads a scenario of one camera or of several, or that of a `run.json`, with `sets` (`--set key=value`, in
-/// order) and `preset` on top, and checks all of it. What `[randomize]` draws is left out
+/// order) and `preset` on top, and checks all of it. What `[randomize]` draws is skipped
 /// ([`read_random_scenario`]).
 ///
 /// # Errors

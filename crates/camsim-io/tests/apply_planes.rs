@@ -1,8 +1,8 @@
-//! Tests `camsim apply`, through its files, against an independent oracle that casts rays into a scene of
+//! Tests `camsim apply`, through its files, against an independent reference that casts rays into a scene of
 //! planes.
 //!
 //! The colours of the ideal picture are its pixel coordinates, so that the colour of an output pixel is its
-//! source or, with an exposure, the mean of its sources. The oracle integrates the pose of the camera in
+//! source or, with an exposure, the mean of its sources. The reference integrates the pose of the camera in
 //! small steps, inverts the lens by Newton's method with finite differences, and intersects each plane, all
 //! in f64.
 #![allow(clippy::unwrap_used)]
@@ -99,7 +99,7 @@ fn undistorted(target: DVec2) -> DVec2 {
     })
 }
 
-/// The source of an output pixel by the oracle.
+/// The source of an output pixel by the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Source {
     /// Visible in the ideal frame.
@@ -111,7 +111,7 @@ enum Source {
 }
 
 /// Casts the ray of an output pixel at a pose.
-fn oracle_source(pixel: DVec2, (world_from_camera, position): (DMat3, DVec3)) -> Source {
+fn reference_source(pixel: DVec2, (world_from_camera, position): (DMat3, DVec3)) -> Source {
     let centre = DVec2::new(f64::from(OUT_PX[0]) - 1.0, f64::from(OUT_PX[1]) - 1.0) * 0.5;
     let uv = undistorted((pixel - centre) / OUT_FOCAL);
     let Some((panel, point)) = cast(position, world_from_camera * uv.extend(1.0)) else {
@@ -188,7 +188,7 @@ fn sources_match_ray_casting() {
         for x in 0..OUT_PX[0] {
             let pixel = DVec2::new(f64::from(x), f64::from(y));
             let rendered = rendered_source_px(&frame, x, y);
-            match oracle_source(pixel, pose) {
+            match reference_source(pixel, pose) {
                 Source::Hidden => hidden += 1,
                 Source::Outside => outside += 1,
                 Source::Visible { panel, position_px } => {
@@ -207,7 +207,7 @@ fn sources_match_ray_casting() {
                         DVec2::new(1.0, -1.0),
                         DVec2::new(-1.0, 1.0),
                     ];
-                    let is_same_panel = |step: &DVec2| match oracle_source(pixel + *step, pose) {
+                    let is_same_panel = |step: &DVec2| match reference_source(pixel + *step, pose) {
                         Source::Visible { panel: other, .. } => other == panel,
                         _ => false,
                     };
@@ -256,14 +256,14 @@ fn blur_is_the_mean_of_sources_over_the_exposure() {
     let folder = tempfile::tempdir().unwrap();
     let (frame, _) = apply(exposure_s, folder.path());
     let (mut one, mut mixed) = (Vec::new(), Vec::new());
-    // Every other row and column, as the oracle casts 96 rays per pixel.
+    // Every other row and column, as the reference casts 96 rays per pixel.
     for y in (0..OUT_PX[1]).step_by(2) {
         let phase = |k: u32| (f64::from(k) + 0.5) / f64::from(INSTANTS) - 0.5;
         let poses: Vec<_> = (0..INSTANTS).map(|k| pose(row_s(y) + phase(k) * exposure_s)).collect();
         for x in (0..OUT_PX[0]).step_by(2) {
             let sources: Vec<Source> = poses
                 .iter()
-                .map(|&pose| oracle_source(DVec2::new(f64::from(x), f64::from(y)), pose))
+                .map(|&pose| reference_source(DVec2::new(f64::from(x), f64::from(y)), pose))
                 .collect();
             let visible: Vec<(usize, DVec2)> = sources
                 .iter()

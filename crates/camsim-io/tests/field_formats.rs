@@ -312,7 +312,7 @@ fn one_receiver_and_its_fixes_are_kept() {
         "names its unit",
         "`GCrs`",
     ];
-    let first: &[&str] = &["those of `0` count, and 61 rows are left out", "names its unit", "`GCrs`"];
+    let first: &[&str] = &["those of `0` count, and 61 rows are skipped", "names its unit", "`GCrs`"];
     let swapped = lines(&receivers, |index, line| match (index, line.rsplit_once(',')) {
         (0, _) => line.to_owned(),
         (_, Some((rest, flag))) => format!("{rest},{}", if flag == "0" { "1" } else { "0" }),
@@ -429,7 +429,7 @@ fn two_receivers(name: &str, values: [&str; 2], offset_s: f64) -> String {
 #[test]
 fn a_column_that_tells_interleaved_tracks_apart_numbers_receivers() {
     let flight = |notes| Flight { notes, ..without_attitude() };
-    let first: &[&str] = &["(61 rows): those of `0` count, and 61 rows are left out"];
+    let first: &[&str] = &["(61 rows): those of `0` count, and 61 rows are skipped"];
     let named: &[&str] = &["`/gps0/fix` (61 rows) and `/gps1/fix` (61 rows): those of `/gps0/fix` count"];
     let used = lines(&two_receivers("gps", ["0", "1"], 0.0), |index, line| match index {
         0 => format!("{line},used"),

@@ -34,7 +34,7 @@ struct Flight {
     /// Motion up from the first row to the last.
     climb_m: f64,
     yaw_deg: f64,
-    /// Numbers of rows left out: without a fix, without a height, unusable.
+    /// Numbers of rows omitted: without a fix, without a height, unusable.
     left_out: [usize; 3],
     /// Origin of a geodetic log: latitude, longitude (degrees), height (metres).
     origin: Option<[f64; 3]>,

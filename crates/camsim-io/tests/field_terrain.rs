@@ -246,7 +246,7 @@ fn ground_outside_of_the_ortho_image_follows_the_key() {
     for (beyond, expected) in [
         (Beyond::Grey, "is grey"),
         (Beyond::Edge, "of the colours at its border"),
-        (Beyond::Void, "left out"),
+        (Beyond::Void, "is void"),
     ] {
         let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
         let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };

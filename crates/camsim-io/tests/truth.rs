@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::Channel,
 };
 use camsim_io::{
@@ -38,12 +38,12 @@ fn demo(sets: &[(&str, &str)]) -> Loaded {
 fn source_coordinates_are_pixels_of_the_camera_in_frames_csv() {
     let sequence = demo(&[]).sequence;
     let planner = Planner::new(sequence.clone(), &CHANNELS, 16_384).unwrap();
-    let oracle = Oracle::new(sequence.clone()).unwrap();
+    let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
     let plan = planner.plan(7).unwrap();
     let key = Some(plan.ideal_view());
     let options =
         RenderOptions { channels: CHANNELS.to_vec(), key, max_samples: 1, ..RenderOptions::default() };
-    let frame = oracle.render(7, &options);
+    let frame = reference.render(7, &options);
     let source = SourceFrame::new(plan.ideal_view(), plan.key_s, sequence.epoch_ns);
     let (depths, coords) = (frame.depth_m().unwrap(), frame.coords().unwrap());
     let (mut ground, mut sky, mut none) = (0, 0, 0);
@@ -89,7 +89,7 @@ fn source_coordinates_are_pixels_of_the_camera_in_frames_csv() {
 fn stamps_start_at_the_configured_epoch() {
     let stamps = |sets: &[(&str, &str)]| {
         let loaded = demo(sets);
-        let frame = Oracle::new(loaded.sequence.clone()).unwrap();
+        let frame = ReferenceRenderer::new(loaded.sequence.clone()).unwrap();
         let rows = frame.row_records(3);
         (
             loaded.log.epoch_ns,

@@ -6,7 +6,7 @@
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
-use camsim_core::{mount::MountError, reference::OracleError, validate::validate};
+use camsim_core::{mount::MountError, reference::ReferenceError, validate::validate};
 use camsim_engine::{Engine, GpuError, RenderError};
 use serde::Serialize;
 
@@ -56,7 +56,7 @@ pub enum BenchError {
     Gpu(#[from] GpuError),
     /// The reference renderer cannot use the camera or shutter.
     #[error(transparent)]
-    Oracle(#[from] OracleError),
+    Reference(#[from] ReferenceError),
     /// The plot failed.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -110,7 +110,7 @@ pub struct BenchReport {
     pub cases: [usize; 2],
     /// The table.
     pub rows: Vec<Row>,
-    /// The case with every effect, with effects left out.
+    /// The case with every effect, without some of its effects.
     pub ablation: Vec<AblationRow>,
     /// Choices of the planner that another method of the same case dominates.
     pub violations: Vec<Violation>,
@@ -177,7 +177,7 @@ pub fn run<E: From<BenchError>>(
         report.violations.extend(confirmation::confirmed(engine, &methods, suspected, limits)?);
         report.rows.extend(rows);
         if case.name == ALL_EFFECTS_CASE && !options.quick {
-            progress(Step::Begins("each effect left out"))?;
+            progress(Step::Begins("without each effect"))?;
             report.ablation = ablation::measure(engine, &case.sequence, limits)?;
         }
         report.cases[0] = number;

@@ -6,7 +6,7 @@ use std::{convert::Infallible, path::PathBuf, sync::Arc};
 use camsim_core::{
     camera::CameraModel,
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{BoardKind, BoardSpec, Channel},
     scene::{Board, BoardPoint, ned_from_board},
     sequence::Sequence,
@@ -130,10 +130,10 @@ fn render(sequence: &Arc<Sequence>, frame: u64) -> RenderedFrame {
 
 /// A pose from near the board.
 const FRAME: u64 = 3;
-/// RMS and largest error of an edge. The oracle's pixels are means over their area. The device reads a pixel
+/// RMS and largest error of an edge. The reference's pixels are means over their area. The device reads a pixel
 /// at its middle from an ideal frame with 1.6 pixels for each: of the reading's phase only edges along the
 /// rows have anything left.
-const OF_ORACLE_PX: [f64; 2] = [0.002, 0.005];
+const OF_REFERENCE_PX: [f64; 2] = [0.002, 0.005];
 const OF_DEVICE_PX: [f64; 2] = [0.02, 0.15];
 
 #[test]
@@ -154,8 +154,9 @@ fn edges_of_a_chessboard_are_where_the_lens_shows_them() {
         .collect();
     let options =
         RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.5, ..RenderOptions::default() };
-    let oracle = Oracle::new(sequence.clone()).expect("an oracle").render(FRAME, &options);
-    let pictures = [("device", render(&sequence, FRAME), OF_DEVICE_PX), ("oracle", oracle, OF_ORACLE_PX)];
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference").render(FRAME, &options);
+    let pictures =
+        [("device", render(&sequence, FRAME), OF_DEVICE_PX), ("reference", reference, OF_REFERENCE_PX)];
     let found = pictures.map(|(name, frame, most)| (name, measure(&frame, &eye, &edges), most));
     for (name, (rms, worst, count), _) in found {
         eprintln!("chessboard, {name}: {rms:.4} px RMS, at most {worst:.4} px over {count} edges");

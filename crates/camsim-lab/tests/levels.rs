@@ -1,5 +1,5 @@
 //! Is the prediction of grey levels honest, and is `quality.max_error_dn` kept? Measured away from
-//! silhouettes, against the oracle's own picture.
+//! silhouettes, against the reference's own picture.
 //!
 //! `CAMSIM_LONG=1` tries all cases of the bench at their own size, with several tolerances; without it two
 //! small ones.

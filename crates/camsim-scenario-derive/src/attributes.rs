@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
 use syn::{Attribute, Expr, ExprLit, Lit, LitStr, Meta, Result, meta::ParseNestedMeta, parse_quote};
 
-/// The text of a doc comment, its lines joined; paragraphs after the first are left out.
+/// The text of a doc comment, its lines joined; paragraphs after the first are skipped.
 pub fn doc(attributes: &[Attribute]) -> String {
     let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
         Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {

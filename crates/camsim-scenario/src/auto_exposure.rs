@@ -62,7 +62,7 @@ pub struct AutoExposureSpec {
     /// Exposure of frame 0.
     pub start: ExposureStart,
     /// Exposure time that makes the scene's white white with gain 1. Give it where
-    /// `camera.shutter.exposure_ms` is 0, for pictures of one instant. Left out:
+    /// `camera.shutter.exposure_ms` is 0, for pictures of one instant. Omitted:
     /// `camera.shutter.exposure_ms`.
     #[key(
         unit = "ms",

@@ -41,7 +41,7 @@ pub struct CameraSpec {
         names = "fx fy"
     )]
     pub focal_px: [f64; 2],
-    /// Principal point c_x, c_y; (0, 0) is the centre of the top-left pixel. Left out: the image centre,
+    /// Principal point c_x, c_y; (0, 0) is the centre of the top-left pixel. Omitted: the image centre,
     /// ((W-1)/2, (H-1)/2).
     #[key(unit = "px", step = 0.1, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -71,7 +71,7 @@ pub struct CameraSpec {
     #[key(example = "\"lens.csv\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens_table: Option<LoadedFile>,
-    /// Calibrations by zoom value, sorted by ascending `at`. They need `camera.zoom_track`. Left out: a fixed
+    /// Calibrations by zoom value, sorted by ascending `at`. They need `camera.zoom_track`. Omitted: a fixed
     /// lens.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub zoom: Vec<ZoomSpec>,
@@ -97,20 +97,20 @@ pub struct CameraSpec {
     /// Faults of trigger, stamps and delivery.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timing: Option<TimingSpec>,
-    /// Picture that the lens makes of a point of light. Left out: a point.
+    /// Picture that the lens makes of a point of light. Omitted: a point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_spread: Option<PointSpreadSpec>,
-    /// Lenses of red and blue light. Left out: all light has the lens of `camera.lens`.
+    /// Lenses of red and blue light. Omitted: all light has the lens of `camera.lens`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chromatic: Option<ChromaticSpec>,
-    /// Circle of the picture that the lens shows. Left out: all of it.
+    /// Circle of the picture that the lens shows. Omitted: all of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_circle: Option<ImageCircleSpec>,
     /// Part and scale of the picture that the camera delivers. The other keys describe the whole picture, and
     /// are adapted when the file is read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resized: Option<ResizedSpec>,
-    /// Picture that the files of `lens_table` and `vignette` are of. Left out: the camera's own.
+    /// Picture that the files of `lens_table` and `vignette` are of. Omitted: the camera's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub files_of: Option<FilesOfSpec>,
     /// The primary that this camera is for, where it is one of three ([`CameraSpec::of_primary`]); files have
@@ -212,7 +212,7 @@ pub enum Axis {
 pub struct LensSpec {
     /// Lens model. "brown-conrady" is the paper's (eqs. 8 and 9).
     pub model: LensModel,
-    /// Coefficients in the order of the model. Trailing ones may be left out.
+    /// Coefficients in the order of the model. Trailing ones may be omitted.
     #[key(step = 0.001, example = "[-0.28, 0.07]")]
     pub coefficients: Vec<f64>,
 }
@@ -275,7 +275,7 @@ pub struct ZoomSpec {
         names = "fx fy"
     )]
     pub focal_px: [f64; 2],
-    /// Principal point at this zoom value. Left out: the image centre.
+    /// Principal point at this zoom value. Omitted: the image centre.
     #[key(unit = "px", step = 0.1, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub principal_point_px: Option<[f64; 2]>,
@@ -409,7 +409,7 @@ pub struct PhotometricSpec {
     pub noise_sigma: f64,
     /// Encoding of PNG files. The viewer always shows sRGB.
     pub output: OutputEncoding,
-    /// Vignetting by a model, which multiplies the map. Left out: the map alone.
+    /// Vignetting by a model, which multiplies the map. Omitted: the map alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignetting: Option<VignettingSpec>,
 }

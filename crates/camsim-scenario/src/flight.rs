@@ -39,7 +39,7 @@ pub struct FlightSpec {
     #[key(example = "\"/odom\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// Part of the log that is flown: begin and end, counted from its first good row. Left out: all of it.
+    /// Part of the log that is flown: begin and end, counted from its first good row. Omitted: all of it.
     #[key(unit = "s", step = 0.05, example = "[0.0, 20.0]", names = "from to")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window_s: Option<[f64; 2]>,

@@ -11,12 +11,12 @@ const UNIT_MATRIX: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageSensorSpec {
-    /// Sensor whose facts from public sources fill keys that are left out.
+    /// Sensor whose facts from public sources fill keys that are omitted.
     #[key(example = "\"imx250\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<SensorModel>,
     /// Electrons that the scene's white makes in the exposure, in a green or the only channel. White is 1 on
-    /// the linear scale. Left out: `white_lux` or `white_w_m2` is the scale.
+    /// the linear scale. Omitted: `white_lux` or `white_w_m2` is the scale.
     #[key(unit = "e-", step = 10.0, above = 0.0, hint = "it is what white stands for", example = "8000.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_e: Option<f64>,
@@ -30,7 +30,7 @@ pub struct ImageSensorSpec {
     #[key(unit = "W/m2", step = 0.001, above = 0.0, hint = "it is what white stands for", example = "0.01")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_w_m2: Option<f64>,
-    /// Time for which light and dark current are collected. Left out: `camera.shutter.exposure_ms`.
+    /// Time for which light and dark current are collected. Omitted: `camera.shutter.exposure_ms`.
     #[key(
         unit = "ms",
         step = 0.1,
@@ -50,12 +50,12 @@ pub struct ImageSensorSpec {
     /// Wavelength of the light of `white_w_m2`.
     #[key(default = 550.0, unit = "nm", above = 0.0, hint = "550 is green")]
     pub wavelength_nm: f64,
-    /// Side of a pixel, for `white_lux` and `white_w_m2`. Left out: that of `model`.
+    /// Side of a pixel, for `white_lux` and `white_w_m2`. Omitted: that of `model`.
     #[key(unit = "um", step = 0.01, above = 0.0, hint = "leave it out if it is unknown", example = "3.45")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel_um: Option<f64>,
     /// Electrons per photon: one number, or those of red, green and blue. With mosaic "rgbw" also of white,
-    /// which else has their luminance. Left out: that of `model`, else 1.
+    /// which else has their luminance. Omitted: that of `model`, else 1.
     #[key(step = 0.005, above = 0.0, max = 1.0, hint = "it is electrons per photon", example = "0.6")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantum_efficiency: Option<PerChannel>,
@@ -66,7 +66,7 @@ pub struct ImageSensorSpec {
     #[key(default = true)]
     pub shot_noise: bool,
     /// Dark current at `dark_reference_c`. That at `temperature_c` is twice as large for each
-    /// `dark_doubling_c` above it. Left out: 0.
+    /// `dark_doubling_c` above it. Omitted: 0.
     #[key(unit = "e-/s", step = 0.1, min = 0.0, hint = "0 is none", example = "0.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dark_current_e_s: Option<f64>,
@@ -79,15 +79,15 @@ pub struct ImageSensorSpec {
     /// Temperature of the sensor.
     #[key(default = 25.0, unit = "deg C", step = 0.1)]
     pub temperature_c: f64,
-    /// Standard deviation of the dark noise without dark current. Left out: that of `model`, else 0.
+    /// Standard deviation of the dark noise without dark current. Omitted: that of `model`, else 0.
     #[key(unit = "e-", step = 0.05, min = 0.0, hint = "0 is none", example = "2.5")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub read_noise_e: Option<f64>,
-    /// Dark signal nonuniformity: standard deviation over the pixels. Left out: 0.
+    /// Dark signal nonuniformity: standard deviation over the pixels. Omitted: 0.
     #[key(unit = "e-", step = 0.05, min = 0.0, hint = "0 is none", example = "0.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dsnu_e: Option<f64>,
-    /// Photo response nonuniformity: relative standard deviation of gains over the pixels. Left out: 0.
+    /// Photo response nonuniformity: relative standard deviation of gains over the pixels. Omitted: 0.
     #[key(step = 0.001, min = 0.0, hint = "0 is none", example = "0.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prnu: Option<f64>,
@@ -113,7 +113,7 @@ pub struct ImageSensorSpec {
     /// Fraction of the pixels that always show the black level.
     #[key(step = 0.0001, min = 0.0, max = 1.0, hint = "it is a fraction of the pixels")]
     pub dead_pixels: f64,
-    /// Largest number of electrons. Left out: that of `model`, else white's, or no limit where
+    /// Largest number of electrons. Omitted: that of `model`, else white's, or no limit where
     /// `gain_e_per_dn` is given.
     #[key(
         unit = "e-",
@@ -124,7 +124,7 @@ pub struct ImageSensorSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub full_well_e: Option<f64>,
-    /// Electrons per digital number (1/K of EMVA 1288), before companding. Left out: the full well gives the
+    /// Electrons per digital number (1/K of EMVA 1288), before companding. Omitted: the full well gives the
     /// largest number.
     #[key(unit = "e-/DN", step = 0.01, above = 0.0, hint = "leave it out if it is unknown", example = "2.6")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -132,7 +132,7 @@ pub struct ImageSensorSpec {
     /// Digital number without electrons, before companding.
     #[key(unit = "DN", min = 0.0, hint = "0 is no offset")]
     pub black_dn: f64,
-    /// Bits of the converter, before companding. Left out: those of `bits`.
+    /// Bits of the converter, before companding. Omitted: those of `bits`.
     #[key(
         step = 0.1,
         min = 8,
@@ -142,7 +142,7 @@ pub struct ImageSensorSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adc_bits: Option<u32>,
-    /// Bits of the digital numbers of the output. Left out: those of `model`, else 12.
+    /// Bits of the digital numbers of the output. Omitted: those of `model`, else 12.
     #[key(step = 0.1, min = 8, max = 16, hint = "12 is common", example = "12")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<u32>,
@@ -156,7 +156,7 @@ pub struct ImageSensorSpec {
     pub mosaic: Mosaic,
     /// Interpolation of the colours of the mosaic.
     pub demosaic: Demosaic,
-    /// Gains of red, green and blue. Left out: such that the scene's white is grey.
+    /// Gains of red, green and blue. Omitted: such that the scene's white is grey.
     #[key(
         unit = "x",
         step = 0.01,
@@ -167,7 +167,7 @@ pub struct ImageSensorSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_balance: Option<[f64; 3]>,
-    /// Matrix from balanced colours to those of the picture, row by row. Left out: the inverse of
+    /// Matrix from balanced colours to those of the picture, row by row. Omitted: the inverse of
     /// `spectral_matrix`, balanced.
     #[key(step = 0.01, example = "[1, 0, 0, 0, 1, 0, 0, 0, 1]", names = "rR rG rB gR gG gB bR bG bB")]
     #[serde(skip_serializing_if = "Option::is_none")]

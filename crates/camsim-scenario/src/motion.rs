@@ -30,15 +30,15 @@ pub struct MotionSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_m_s: Option<f64>,
-    /// Path time at which the model leaves the first point of `path`. It stands there before. Left out: 0.
+    /// Path time at which the model leaves the first point of `path`. It stands there before. Omitted: 0.
     #[key(unit = "s", step = 0.1, example = "0.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start_s: Option<f64>,
-    /// What happens at the end of `path`. Left out: `once`.
+    /// What happens at the end of `path`. Omitted: `once`.
     #[key(example = "\"once\"")]
     #[serde(rename = "loop", skip_serializing_if = "Option::is_none")]
     pub repeat: Option<LoopKind>,
-    /// Whether the model's front looks where it goes. Left out: it does, unless `poses` has attitudes.
+    /// Whether the model's front looks where it goes. Omitted: it does, unless `poses` has attitudes.
     #[key(example = "true")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub orient: Option<bool>,
@@ -62,7 +62,7 @@ pub struct SpinSpec {
     /// Angle at path time 0.
     #[key(unit = "deg")]
     pub phase_deg: f64,
-    /// Name of the node that spins with all its children. Left out: the whole model.
+    /// Name of the node that spins with all its children. Omitted: the whole model.
     #[key(example = "\"rotor\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub node: Option<String>,

@@ -67,7 +67,7 @@ pub struct ChromaticSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct PrimaryLensSpec {
-    /// Focal lengths of this colour. Left out: the camera's.
+    /// Focal lengths of this colour. Omitted: the camera's.
     #[key(
         unit = "px",
         step = 0.1,
@@ -78,15 +78,15 @@ pub struct PrimaryLensSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_px: Option<[f64; 2]>,
-    /// Principal point of this colour. Left out: the camera's.
+    /// Principal point of this colour. Omitted: the camera's.
     #[key(unit = "px", step = 0.05, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub principal_point_px: Option<[f64; 2]>,
-    /// Lens model of this colour. Left out: the camera's.
+    /// Lens model of this colour. Omitted: the camera's.
     #[key(example = "\"brown-conrady\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<LensModel>,
-    /// Coefficients of this colour's lens. Left out: the camera's, or none with another model.
+    /// Coefficients of this colour's lens. Omitted: the camera's, or none with another model.
     #[key(step = 0.0005, example = "[-0.28, 0.07]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients: Option<Vec<f64>>,
@@ -125,15 +125,15 @@ impl ChromaticSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageCircleSpec {
-    /// Radius of the circle. Left out: no limit but `half_angle_deg`.
+    /// Radius of the circle. Omitted: no limit but `half_angle_deg`.
     #[key(unit = "px", above = 0.0, hint = "pixels farther from centre_px are invalid", example = "300.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_px: Option<f64>,
-    /// Centre of the circle of `radius_px`. Left out: the principal point.
+    /// Centre of the circle of `radius_px`. Omitted: the principal point.
     #[key(unit = "px", step = 0.5, example = "[319.5, 239.5]", names = "cx cy")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_px: Option<[f64; 2]>,
-    /// Largest angle of a ray to the optical axis, instead of `radius_px` or beside it. Left out: no limit.
+    /// Largest angle of a ray to the optical axis, instead of `radius_px` or beside it. Omitted: no limit.
     #[key(
         unit = "deg",
         step = 0.5,
@@ -154,15 +154,15 @@ pub struct VignettingSpec {
     #[key(step = 0.1, min = 0.0, max = 100.0, hint = "4 is natural vignetting, 0 none")]
     pub cos_power: f64,
     /// Terms k1, k2, k3 of 1 + k1 r^2 + k2 r^4 + k3 r^6. r is the distance from the principal point, 1 at
-    /// half the picture's diagonal. Trailing terms may be left out.
+    /// half the picture's diagonal. Trailing terms may be omitted.
     #[key(step = 0.005, example = "[-0.3, 0.1, 0.0]")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub polynomial: Vec<f64>,
-    /// Polynomial of red, instead of `polynomial`. Left out: that of all.
+    /// Polynomial of red, instead of `polynomial`. Omitted: that of all.
     #[key(step = 0.005, example = "[-0.32]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomial_red: Option<Vec<f64>>,
-    /// Polynomial of blue, instead of `polynomial`. Left out: that of all.
+    /// Polynomial of blue, instead of `polynomial`. Omitted: that of all.
     #[key(step = 0.005, example = "[-0.28]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomial_blue: Option<Vec<f64>>,

@@ -15,7 +15,7 @@ const MAX_OVERSAMPLING: u32 = 64;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct PointSpreadSpec {
-    /// Standard deviation of the lens's Gaussian blur. Left out: none.
+    /// Standard deviation of the lens's Gaussian blur. Omitted: none.
     #[key(
         unit = "px",
         step = 0.01,
@@ -26,12 +26,12 @@ pub struct PointSpreadSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_px: Option<f64>,
-    /// Focal length over aperture: diffraction by a circular aperture, an Airy pattern. Left out: no
+    /// Focal length over aperture: diffraction by a circular aperture, an Airy pattern. Omitted: no
     /// diffraction.
     #[key(step = 0.05, above = 0.0, hint = "leave it out for a lens without diffraction", example = "8.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
-    /// Side of a pixel, for the diffraction by `f_number`. Left out: that of `camera.sensor`.
+    /// Side of a pixel, for the diffraction by `f_number`. Omitted: that of `camera.sensor`.
     #[key(unit = "um", step = 0.01, above = 0.0, hint = "it is the side of a pixel", example = "3.45")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel_um: Option<f64>,
@@ -44,7 +44,7 @@ pub struct PointSpreadSpec {
         hint = "give one wavelength or [red, green, blue]"
     )]
     pub wavelength_nm: PerChannel,
-    /// Diameter of the even disc of a lens out of focus. Left out: none.
+    /// Diameter of the even disc of a lens out of focus. Omitted: none.
     #[key(
         unit = "px",
         step = 0.02,
@@ -55,7 +55,7 @@ pub struct PointSpreadSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub defocus_px: Option<f64>,
-    /// Picture of a point of light, without the pixel's own area: PNG, EXR or CSV. Left out: none.
+    /// Picture of a point of light, without the pixel's own area: PNG, EXR or CSV. Omitted: none.
     #[key(example = "\"kernel.png\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kernel: Option<LoadedFile>,

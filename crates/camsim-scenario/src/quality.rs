@@ -113,6 +113,6 @@ pub enum Solver {
     Rk2,
     /// Exact relative pose per row and sample, depth by fixed-point iteration.
     Reproject,
-    /// An exact ray on the CPU for every sample of every pixel: the reference, slow.
-    Oracle,
+    /// An exact ray on the CPU for every sample of every pixel: the reference renderer, slow.
+    Reference,
 }

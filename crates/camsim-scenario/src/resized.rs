@@ -9,7 +9,7 @@ use super::{MAX_SIDE_PX, keys::Table};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct ResizedSpec {
-    /// Part of the calibrated picture: left, top, width, height, in its pixels. Left out: all of it.
+    /// Part of the calibrated picture: left, top, width, height, in its pixels. Omitted: all of it.
     #[key(
         unit = "px",
         min = 0,
@@ -21,15 +21,15 @@ pub struct ResizedSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop_px: Option<[u32; 4]>,
     /// Pixels across and down that make one: a number, or one of each. Those that are left over on the right
-    /// and below are not used. Left out: one pixel stays one.
+    /// and below are not used. Omitted: one pixel stays one.
     #[key(step = 0.05, min = 1, max = MAX_SIDE_PX, hint = "2 makes one of 2 x 2", example = "2")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub binning: Option<Binning>,
-    /// Factor on width and height, which are rounded, instead of `binning`. Left out: no change.
+    /// Factor on width and height, which are rounded, instead of `binning`. Omitted: no change.
     #[key(step = 0.005, above = 0.0, max = MAX_SIDE_PX, hint = "0.5 halves both", example = "0.5")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// Width and height of the delivered picture, instead of `binning` and `scale`. Left out: by these.
+    /// Width and height of the delivered picture, instead of `binning` and `scale`. Omitted: by these.
     #[key(
         unit = "px",
         min = 1,

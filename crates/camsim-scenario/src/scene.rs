@@ -52,11 +52,11 @@ pub struct SceneSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sky_brightness: Option<f64>,
     /// Visibility V in fog. Colour is mixed with the sky by 1 - exp(-3.912 d / V), with the slant range d.
-    /// Left out: clear air.
+    /// Omitted: clear air.
     #[key(unit = "m", step = 50.0, above = 0.0, hint = "leave it out for clear air", example = "5000.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,
-    /// Light of sun and sky on terrain and models. Left out: colours as they are.
+    /// Light of sun and sky on terrain and models. Omitted: colours as they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub light: Option<LightSpec>,
 }
@@ -113,18 +113,18 @@ pub struct TerrainSpec {
     #[key(example = "\"m\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_unit: Option<HeightUnit>,
-    /// Stored value of white in the orthophoto, if it does not use all bits. Left out: the largest value of
+    /// Stored value of white in the orthophoto, if it does not use all bits. Omitted: the largest value of
     /// its bits.
     #[key(above = 0.0, hint = "give the stored value of white, 2047 for 11 bits", example = "2047.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ortho_white: Option<f64>,
     /// Appearance of ground beyond the orthophoto.
     pub beyond: Beyond,
-    /// Name of the object in `objects.csv`. Left out: `terrain`.
+    /// Name of the object in `objects.csv`. Omitted: `terrain`.
     #[key(example = "\"valley\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of the object. Left out: 0, none.
+    /// Class of the object. Omitted: 0, none.
     #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "1")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
@@ -195,11 +195,11 @@ pub struct PatternSpec {
     /// Centre: `"origin"` or north, east, down.
     #[key(unit = "m", names = "N E D")]
     pub at: PatternCentre,
-    /// Name of the object in `objects.csv`. Left out: `pattern`.
+    /// Name of the object in `objects.csv`. Omitted: `pattern`.
     #[key(example = "\"grid\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of the object. Left out: 0, none.
+    /// Class of the object. Omitted: 0, none.
     #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "1")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
@@ -232,15 +232,15 @@ pub struct BoardSpec {
     #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.05")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<f64>,
-    /// Height of a chessboard's squares. Left out: their width.
+    /// Height of a chessboard's squares. Omitted: their width.
     #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.04")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_size_m: Option<f64>,
-    /// Diameter of a circle. Left out: half the spacing.
+    /// Diameter of a circle. Omitted: half the spacing.
     #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.025")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diameter_m: Option<f64>,
-    /// Gap between tags of an AprilGrid, as a fraction of their side. Left out: 0.3.
+    /// Gap between tags of an AprilGrid, as a fraction of their side. Omitted: 0.3.
     #[key(
         step = 0.005,
         above = 0.0,
@@ -250,19 +250,19 @@ pub struct BoardSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<f64>,
-    /// Side of a ChArUco board's markers. Left out: three quarters of a square.
+    /// Side of a ChArUco board's markers. Omitted: three quarters of a square.
     #[key(unit = "m", step = 0.001, above = 0.0, hint = "give metres above 0", example = "0.0375")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub marker_m: Option<f64>,
-    /// Dictionary of a ChArUco board's markers. Left out: `4x4`.
+    /// Dictionary of a ChArUco board's markers. Omitted: `4x4`.
     #[key(example = "\"4x4\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dictionary: Option<Dictionary>,
-    /// Number of the first tag or marker. Left out: 0.
+    /// Number of the first tag or marker. Omitted: 0.
     #[key(step = 0.2, max = 586, example = "0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<u32>,
-    /// Least width of the white margin. Left out: that usual for the kind of board.
+    /// Least width of the white margin. Omitted: that usual for the kind of board.
     #[key(unit = "m", step = 0.001, min = 0.0, hint = "give metres, 0 or more", example = "0.05")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin_m: Option<f64>,
@@ -278,11 +278,11 @@ pub struct BoardSpec {
     /// upright and faces a viewer who looks north.
     #[key(unit = "deg", step = 0.1, names = "roll pitch yaw")]
     pub angles_deg: [f64; 3],
-    /// Name of the object in `objects.csv`. Left out: `board`.
+    /// Name of the object in `objects.csv`. Omitted: `board`.
     #[key(example = "\"target\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of the object. Left out: 0, none.
+    /// Class of the object. Omitted: 0, none.
     #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "1")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
@@ -316,25 +316,25 @@ pub struct GltfSpec {
     pub scale: f64,
     /// Whether the model's origin is placed on the terrain, whatever its height.
     pub on_ground: bool,
-    /// Index of the scene in the file. Left out: the file's own choice.
+    /// Index of the scene in the file. Omitted: the file's own choice.
     #[key(step = 0.1, example = "0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scene: Option<u32>,
-    /// Time in the model's animations; with `motion.animate`, that at path time 0. Left out: nodes keep their
+    /// Time in the model's animations; with `motion.animate`, that at path time 0. Omitted: nodes keep their
     /// static pose.
     #[key(unit = "s", step = 0.01, example = "0.0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
-    /// Index of the animation in the file. Left out: all animations together.
+    /// Index of the animation in the file. Omitted: all animations together.
     #[key(step = 0.1, example = "0")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub animation: Option<u32>,
-    /// Name of its objects in `objects.csv`. Left out: the file's name without ending. The k-th row of a
+    /// Name of its objects in `objects.csv`. Omitted: the file's name without ending. The k-th row of a
     /// placement table (from 1) gives `name#k`, and each node or material `name/node`.
     #[key(example = "\"house\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Class of its objects. Left out: 0, none.
+    /// Class of its objects. Omitted: 0, none.
     #[key(step = 0.2, min = 1, max = u16::MAX, hint = "leave it out for no class", example = "3")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub class: Option<u16>,
@@ -345,7 +345,7 @@ pub struct GltfSpec {
     #[key(min = 1, max = u16::MAX, hint = "leave it out for no class", example = "{ roof = 4 }")]
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub classes: BTreeMap<String, u16>,
-    /// How it moves. Left out: it stands still.
+    /// How it moves. Omitted: it stands still.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSpec>,
 }

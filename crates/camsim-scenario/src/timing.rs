@@ -38,7 +38,7 @@ pub struct TimingSpec {
     #[key(step = 0.005, min = 0.0, below = 1.0, hint = "it is a fraction of the frames")]
     pub double_probability: f64,
     /// Name of the trigger that the camera shares with others. Cameras of a rig with the same one are late
-    /// together, and miss triggers together. Left out: a trigger of its own.
+    /// together, and miss triggers together. Omitted: a trigger of its own.
     #[key(example = "\"wire\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trigger: Option<String>,

@@ -10,14 +10,14 @@ use super::{
 /// Largest number of pictures of a burst.
 pub const MAX_INSTANTS: u32 = 1000;
 
-/// A better camera, by what is left out of it. Keys that are not given are as in the frame.
+/// A better camera, by what it lacks. Keys that are not given are as in the frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Table)]
 #[serde(default, deny_unknown_fields)]
 pub struct TwinSpec {
     /// Name of the twin's folder, below that of the frames.
     #[key(required, example = "\"sharp\"")]
     pub name: String,
-    /// Whether it has the exposure. `false`: an instant, hence no motion blur. Left out: as the frame.
+    /// Whether it has the exposure. `false`: an instant, hence no motion blur. Omitted: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<bool>,
@@ -25,7 +25,7 @@ pub struct TwinSpec {
     #[key(example = "\"global\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shutter: Option<TwinShutter>,
-    /// Instant of a global shutter. Left out: mid-exposure of the image's centre.
+    /// Instant of a global shutter. Omitted: mid-exposure of the image's centre.
     #[key(example = "\"centre\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instant: Option<FlowInstant>,
@@ -34,18 +34,18 @@ pub struct TwinSpec {
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens: Option<bool>,
-    /// Whether it has the noise. Left out: as the frame.
+    /// Whether it has the noise. Omitted: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<bool>,
-    /// Whether it has the vignette. Left out: as the frame.
+    /// Whether it has the vignette. Omitted: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vignette: Option<bool>,
     /// Neither exposure, rolling shutter, lens, noise, vignette nor point spread.
     #[serde(skip_serializing_if = "crate::is_default")]
     pub ideal: bool,
-    /// Pictures in a burst for each frame, each without exposure. Left out: one picture of each frame.
+    /// Pictures in a burst for each frame, each without exposure. Omitted: one picture of each frame.
     #[key(
         step = 0.1,
         min = 1,
@@ -55,15 +55,15 @@ pub struct TwinSpec {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instants: Option<u32>,
-    /// What the instants of a burst are spread over. Left out: the exposure.
+    /// What the instants of a burst are spread over. Omitted: the exposure.
     #[key(example = "\"exposure\"")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub over: Option<BurstOver>,
-    /// Channels of the twin. Left out: those of the frame.
+    /// Channels of the twin. Omitted: those of the frame.
     #[key(example = "[\"color\"]")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<Channel>>,
-    /// Whether it has the point spread and the glare. Left out: as the frame.
+    /// Whether it has the point spread and the glare. Omitted: as the frame.
     #[key(example = "false")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_spread: Option<bool>,

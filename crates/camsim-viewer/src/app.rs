@@ -11,7 +11,7 @@ use eframe::egui;
 
 use crate::{
     display_image,
-    engine::{EngineHandle, FrameRequest, OracleRequest, Picture},
+    engine::{EngineHandle, FrameRequest, Picture, ReferenceRequest},
     export::Exporter,
     fonts,
     frame_rate::FrameRateMonitor,
@@ -32,22 +32,22 @@ pub struct Viewer {
     pub state: State,
     engine: EngineHandle,
     last_request: Option<FrameRequest>,
-    /// The last request to the oracle; equal ones are not sent again.
-    last_oracle_request: Option<OracleRequestKey>,
+    /// The last request to the reference; equal ones are not sent again.
+    last_reference_request: Option<ReferenceRequestKey>,
     frame_rate: Option<FrameRateMonitor>,
     title: String,
 }
 
-/// Identity of a request to the oracle.
+/// Identity of a request to the reference.
 #[derive(Debug)]
-struct OracleRequestKey {
+struct ReferenceRequestKey {
     sequence: Weak<Sequence>,
     frame: Option<u64>,
     against: Option<(Weak<Picture>, f32)>,
 }
 
-impl OracleRequestKey {
-    fn new(request: &OracleRequest) -> Self {
+impl ReferenceRequestKey {
+    fn new(request: &ReferenceRequest) -> Self {
         let against = request.against.as_ref().map(|(picture, gain)| (Arc::downgrade(picture), *gain));
         Self { sequence: Arc::downgrade(&request.sequence), frame: request.frame, against }
     }
@@ -82,7 +82,7 @@ impl Viewer {
             state,
             engine,
             last_request: None,
-            last_oracle_request: None,
+            last_reference_request: None,
             frame_rate: FrameRateMonitor::from_env(),
             title: String::new(),
         }
@@ -140,11 +140,11 @@ impl Viewer {
             self.engine.request_frame(request.clone());
         }
         self.last_request = request;
-        let Some(request) = self.state.oracle_request() else { return };
-        let key = OracleRequestKey::new(&request);
-        if !self.last_oracle_request.as_ref().is_some_and(|last| last.equals(&key)) {
-            self.engine.request_oracle(request);
-            self.last_oracle_request = Some(key);
+        let Some(request) = self.state.reference_request() else { return };
+        let key = ReferenceRequestKey::new(&request);
+        if !self.last_reference_request.as_ref().is_some_and(|last| last.equals(&key)) {
+            self.engine.request_reference(request);
+            self.last_reference_request = Some(key);
         }
     }
 

@@ -9,8 +9,8 @@
 mod error_overlay;
 mod mailbox;
 mod messages;
-mod oracle;
 mod picture;
+mod reference;
 mod scenario_cache;
 mod variants;
 mod worker;
@@ -27,7 +27,7 @@ use std::{
 pub use error_overlay::{DECADES, ErrorOverlay};
 pub use mailbox::Mailbox;
 pub use messages::{
-    DepthPicture, FrameReply, FrameRequest, OraclePicture, OracleRequest, Reply, Size, Stage,
+    DepthPicture, FrameReply, FrameRequest, ReferencePicture, ReferenceRequest, Reply, Size, Stage,
 };
 pub use picture::{Difference, Picture, ramp};
 use scenario_cache::ScenarioCache;
@@ -39,7 +39,7 @@ pub use variants::{preview_factor, stage_scenario};
 pub struct EngineHandle {
     previews: Arc<Mailbox<FrameRequest>>,
     full_frames: Arc<Mailbox<FrameRequest>>,
-    oracle: Arc<Mailbox<OracleRequest>>,
+    reference: Arc<Mailbox<ReferenceRequest>>,
     scenarios: Arc<ScenarioCache>,
     replies: Receiver<Reply>,
     threads: Vec<JoinHandle<()>>,
@@ -71,7 +71,7 @@ impl EngineHandle {
     pub fn start(repaint: impl Fn() + Send + Sync + 'static) -> Self {
         let (sender, replies) = channel();
         let reply_sender = ReplySender { sender, repaint: Arc::new(repaint) };
-        let (previews, full_frames, oracle) =
+        let (previews, full_frames, reference) =
             (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
         let scenarios = Arc::new(ScenarioCache::default());
         let mut threads = Vec::new();
@@ -81,11 +81,11 @@ impl EngineHandle {
                 worker::run(&mailbox, &scenarios, &replies)
             }));
         }
-        let (mailbox, replies_of_oracle) = (oracle.clone(), reply_sender.clone());
-        threads.extend(spawn("camsim oracle", reply_sender, move || {
-            oracle::run(&mailbox, &replies_of_oracle);
+        let (mailbox, replies_of_reference) = (reference.clone(), reply_sender.clone());
+        threads.extend(spawn("camsim reference", reply_sender, move || {
+            reference::run(&mailbox, &replies_of_reference);
         }));
-        Self { previews, full_frames, oracle, scenarios, replies, threads }
+        Self { previews, full_frames, reference, scenarios, replies, threads }
     }
 
     /// Replaces the request to the renderer. A preview also withdraws a full frame that has not begun.
@@ -100,9 +100,9 @@ impl EngineHandle {
         }
     }
 
-    /// Replaces the request to the oracle.
-    pub fn request_oracle(&self, request: OracleRequest) {
-        self.oracle.put(request);
+    /// Replaces the request to the reference.
+    pub fn request_reference(&self, request: ReferenceRequest) {
+        self.reference.put(request);
     }
 
     /// Takes the replies that have arrived.
@@ -115,7 +115,7 @@ impl Drop for EngineHandle {
     fn drop(&mut self) {
         self.previews.close();
         self.full_frames.close();
-        self.oracle.close();
+        self.reference.close();
         for thread in self.threads.drain(..) {
             // `spawn` catches and reports panics.
             let _ = thread.join();

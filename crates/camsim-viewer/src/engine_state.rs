@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Instant};
 
-use camsim_core::{flight_log::FlightLog, reference::Oracle, sequence::Sequence};
+use camsim_core::{flight_log::FlightLog, reference::ReferenceRenderer, sequence::Sequence};
 use camsim_io::load::Loaded;
 use camsim_plan::FramePlan;
 use eframe::egui;
@@ -10,7 +10,7 @@ use eframe::egui;
 use crate::{
     display_image::DisplayImage,
     engine::{
-        DepthPicture, Difference, ErrorOverlay, FrameReply, OraclePicture, Picture, Reply, Size, Stage,
+        DepthPicture, Difference, ErrorOverlay, FrameReply, Picture, ReferencePicture, Reply, Size, Stage,
     },
 };
 
@@ -33,9 +33,9 @@ pub struct EngineState {
     /// The last rendered frame.
     pub shown: Option<ShownFrame>,
     /// Exact rays for single pixels.
-    pub oracle: Option<Arc<Oracle>>,
-    /// The oracle's picture of a whole frame.
-    pub oracle_picture: Option<ShownOraclePicture>,
+    pub reference: Option<Arc<ReferenceRenderer>>,
+    /// The reference's picture of a whole frame.
+    pub reference_picture: Option<ShownReferencePicture>,
     /// The last fault; cleared by the next frame.
     pub fault: Option<String>,
     /// Render time of the last frame in full size, ms.
@@ -58,10 +58,10 @@ pub struct ShownFrame {
     pub errors: Vec<DisplayImage>,
 }
 
-/// The oracle's picture with its images for the screen; rows may still be missing.
-pub struct ShownOraclePicture {
+/// The reference's picture with its images for the screen; rows may still be missing.
+pub struct ShownReferencePicture {
     /// The engine's reply.
-    pub picture: OraclePicture,
+    pub picture: ReferencePicture,
     /// Image of the picture.
     pub image: DisplayImage,
     /// Image of the difference from a rendered picture, if requested.
@@ -79,11 +79,11 @@ pub struct StagePicture<'a> {
     pub color_rgba: &'a [f32],
     /// The stage that it shows.
     pub stage: Stage,
-    /// The plan that it was rendered by; the oracle has none.
+    /// The plan that it was rendered by; the reference has none.
     pub plan: Option<&'a FramePlan>,
     /// Predicted error per image cell and its image, if requested.
     pub errors: Option<(&'a ErrorOverlay, &'a DisplayImage)>,
-    /// Depth and its image, if requested; the oracle's picture has none.
+    /// Depth and its image, if requested; the reference's picture has none.
     pub depth: Option<(&'a DepthPicture, &'a DisplayImage)>,
 }
 
@@ -103,7 +103,7 @@ impl EngineState {
                 }
                 self.loaded = Some(loaded);
             }
-            Reply::Oracle(oracle) => self.oracle = Some(oracle),
+            Reply::Reference(reference) => self.reference = Some(reference),
             Reply::Failed(fault) => self.fault = Some(fault),
             // `State` keeps notices.
             Reply::Notice(_) => {}
@@ -124,16 +124,21 @@ impl EngineState {
                     shown.set_errors(reply.errors, context);
                 }
             }
-            Reply::OraclePicture(picture) => {
+            Reply::ReferencePicture(picture) => {
                 let (old, old_difference) = self
-                    .oracle_picture
+                    .reference_picture
                     .take()
                     .map_or((None, None), |before| (Some(before.image), before.difference));
-                let image = DisplayImage::new(context, "oracle", picture.image.clone(), old);
+                let image = DisplayImage::new(context, "reference", picture.image.clone(), old);
                 let difference = picture.difference.as_ref().map(|difference| {
-                    DisplayImage::new(context, "oracle difference", difference.image.clone(), old_difference)
+                    DisplayImage::new(
+                        context,
+                        "reference difference",
+                        difference.image.clone(),
+                        old_difference,
+                    )
                 });
-                self.oracle_picture = Some(ShownOraclePicture { picture: *picture, image, difference });
+                self.reference_picture = Some(ShownReferencePicture { picture: *picture, image, difference });
             }
         }
     }
@@ -146,8 +151,8 @@ impl EngineState {
     /// The picture of a stage of the shown frame.
     pub fn stage_picture(&self, stage: Stage) -> Option<StagePicture<'_>> {
         let shown = self.shown.as_ref()?;
-        if stage == Stage::Oracle {
-            let ShownOraclePicture { picture, image, .. } = self.current_oracle_picture()?;
+        if stage == Stage::Reference {
+            let ShownReferencePicture { picture, image, .. } = self.current_reference_picture()?;
             let size_px = picture.sequence.scenario.camera.size_px;
             return Some(StagePicture {
                 image,
@@ -172,11 +177,11 @@ impl EngineState {
         Some(self.sequence()?.stamp_s(frame as f64))
     }
 
-    /// The surface point that a pixel of the shown frame sees; `None` for the sky, and until the oracle is
+    /// The surface point that a pixel of the shown frame sees; `None` for the sky, and until the reference is
     /// ready.
     pub fn point_ned_m(&self, pixel: [u32; 2]) -> Option<glam::DVec3> {
-        let (oracle, shown) = (self.current_oracle()?, self.shown.as_ref()?);
-        oracle.sample(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
+        let (reference, shown) = (self.current_reference()?, self.shown.as_ref()?);
+        reference.sample(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
     }
 
     /// The first picture of the shown frame.
@@ -184,23 +189,23 @@ impl EngineState {
         self.shown.as_ref().and_then(|shown| shown.reply.pictures.first())
     }
 
-    /// The oracle's picture, if it is of the shown frame.
-    pub fn current_oracle_picture(&self) -> Option<&ShownOraclePicture> {
-        let (oracle, shown) = (self.oracle_picture.as_ref()?, self.shown.as_ref()?);
-        (self.is_current(&oracle.picture.sequence) && oracle.picture.frame == shown.reply.frame)
-            .then_some(oracle)
+    /// The reference's picture, if it is of the shown frame.
+    pub fn current_reference_picture(&self) -> Option<&ShownReferencePicture> {
+        let (reference, shown) = (self.reference_picture.as_ref()?, self.shown.as_ref()?);
+        (self.is_current(&reference.picture.sequence) && reference.picture.frame == shown.reply.frame)
+            .then_some(reference)
     }
 
-    /// The oracle, if it is of the loaded sequence.
-    pub fn current_oracle(&self) -> Option<&Arc<Oracle>> {
-        self.oracle.as_ref().filter(|oracle| self.is_current(oracle.sequence()))
+    /// The reference, if it is of the loaded sequence.
+    pub fn current_reference(&self) -> Option<&Arc<ReferenceRenderer>> {
+        self.reference.as_ref().filter(|reference| self.is_current(reference.sequence()))
     }
 
-    /// The difference to show: from the oracle, or between two rendered pictures.
-    pub fn difference(&self, with_oracle: bool) -> Option<(&Arc<Difference>, &DisplayImage)> {
-        if with_oracle {
-            let oracle = self.current_oracle_picture()?;
-            return oracle.picture.difference.as_ref().zip(oracle.difference.as_ref());
+    /// The difference to show: from the reference, or between two rendered pictures.
+    pub fn difference(&self, with_reference: bool) -> Option<(&Arc<Difference>, &DisplayImage)> {
+        if with_reference {
+            let reference = self.current_reference_picture()?;
+            return reference.picture.difference.as_ref().zip(reference.difference.as_ref());
         }
         let shown = self.shown.as_ref()?;
         shown.reply.difference.as_ref().zip(shown.difference.as_ref())

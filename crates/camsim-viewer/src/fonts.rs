@@ -305,7 +305,7 @@ mod tests {
 
     #[test]
     fn system_fonts_have_the_glyphs_of_their_scripts() {
-        // Hangul is left out: some versions of Droid Sans Fallback lack it.
+        // Hangul is skipped: some versions of Droid Sans Fallback lack it.
         for (text, script) in
             [("\u{98db}\u{884c}", Han), ("\u{30ab}\u{30e1}\u{30e9}", Kana), ("\u{531}", Other)]
         {

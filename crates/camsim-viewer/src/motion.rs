@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use camsim_core::{
     camera::CameraModel,
     pose::CameraPose,
-    reference::{Oracle, RaySample},
+    reference::{RaySample, ReferenceRenderer},
     scenario::CameraSpec,
 };
 use glam::{DVec2, DVec3};
@@ -27,34 +27,35 @@ pub struct PixelPath {
 }
 
 /// Motion of a grid of pixels over a frame. The last result is cached, since it is drawn in each pass.
-pub fn grid_paths(oracle: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
-    type PathCache = Option<(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)>;
+pub fn grid_paths(reference: &Arc<ReferenceRenderer>, frame: u64) -> Arc<Vec<PixelPath>> {
+    type PathCache = Option<(Weak<ReferenceRenderer>, u64, Arc<Vec<PixelPath>>)>;
     static CACHE: Mutex<PathCache> = Mutex::new(None);
     let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
-    let is_same = |(cached_oracle, cached_frame, _): &&(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)| {
-        *cached_frame == frame && std::ptr::eq(cached_oracle.as_ptr(), Arc::as_ptr(oracle))
-    };
+    let is_same =
+        |(cached_reference, cached_frame, _): &&(Weak<ReferenceRenderer>, u64, Arc<Vec<PixelPath>>)| {
+            *cached_frame == frame && std::ptr::eq(cached_reference.as_ptr(), Arc::as_ptr(reference))
+        };
     if let Some((_, _, paths)) = cache.as_ref().filter(is_same) {
         return paths.clone();
     }
-    let [width, height] = oracle.sequence().scenario.camera.size_px;
+    let [width, height] = reference.sequence().scenario.camera.size_px;
     let position =
         |k: u32, n: u32, side: u32| ((2 * u64::from(k) + 1) * u64::from(side) / (2 * u64::from(n))) as u32;
     let cells = (0..GRID[1]).flat_map(|y| (0..GRID[0]).map(move |x| [x, y]));
     let pixels = cells.map(|[x, y]| [position(x, GRID[0], width), position(y, GRID[1], height)]);
     let paths: Arc<Vec<PixelPath>> =
-        Arc::new(pixels.filter_map(|pixel| pixel_path(oracle, frame, pixel)).collect());
-    *cache = Some((Arc::downgrade(oracle), frame, paths.clone()));
+        Arc::new(pixels.filter_map(|pixel| pixel_path(reference, frame, pixel)).collect());
+    *cache = Some((Arc::downgrade(reference), frame, paths.clone()));
     paths
 }
 
 /// Motion of the point that one pixel sees; `None` if the pixel has no ray.
-pub fn pixel_path(oracle: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
-    let sample = oracle.sample(frame, pixel, DVec2::ZERO, 0.0)?;
-    let sequence = oracle.sequence();
+pub fn pixel_path(reference: &ReferenceRenderer, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
+    let sample = reference.sample(frame, pixel, DVec2::ZERO, 0.0)?;
+    let sequence = reference.sequence();
     let camera = camera_model(&sequence.scenario.camera)?;
     let position_px = |t_s: f64| project(&camera, &sequence.path.pose(t_s), &sample);
-    let exposure_s = oracle.exposure_s(frame, pixel);
+    let exposure_s = reference.exposure_s(frame, pixel);
     let phases = (0..EXPOSURE_POINTS).map(|k| f64::from(k) / f64::from(EXPOSURE_POINTS - 1) - 0.5);
     let exposure_px = if exposure_s > 0.0 {
         phases.filter_map(|phase| position_px(sample.t_s + phase * exposure_s)).collect()
@@ -63,7 +64,7 @@ pub fn pixel_path(oracle: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelP
     };
     Some(PixelPath {
         pixel: DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])),
-        at_stamp_px: position_px(oracle.stamp_s(frame)),
+        at_stamp_px: position_px(reference.stamp_s(frame)),
         exposure_px,
     })
 }

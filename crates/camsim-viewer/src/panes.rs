@@ -38,7 +38,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     let panel = egui::Frame::side_top_panel(&style).fill(egui::Color32::TRANSPARENT);
     egui::Panel::top("menu").frame(panel).show(ui, |ui| menu::show(ui, state, out));
     egui::Panel::bottom("timeline").frame(panel).show(ui, |ui| timeline::show(ui, state, out));
-    // Side panels are left out of narrow windows, where they would cover the picture.
+    // Side panels are hidden in narrow windows, where they would cover the picture.
     let width = ui.available_width();
     if width >= MIN_WIDTH_PARAMETERS {
         egui::Panel::left("parameters")

@@ -10,7 +10,7 @@ use eframe::egui;
 
 use crate::{
     document::Document,
-    engine::{FrameRequest, OracleRequest, Picture, Reply, Size, Stage},
+    engine::{FrameRequest, Picture, ReferenceRequest, Reply, Size, Stage},
     engine_state::EngineState,
     export::{ExportJob, Exporter},
     file_dialog::{DialogResult, FileDialog},
@@ -197,22 +197,22 @@ impl State {
         self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel
     }
 
-    /// What the oracle should do once a full frame is shown: rays for single pixels, and its picture if that
+    /// What the reference should do once a full frame is shown: rays for single pixels, and its picture if that
     /// is shown.
-    pub fn oracle_request(&self) -> Option<OracleRequest> {
+    pub fn reference_request(&self) -> Option<ReferenceRequest> {
         let (shown, sequence) = (self.engine.shown.as_ref()?, self.engine.sequence()?);
         let is_full = shown.reply.request.size == Size::Full
             && Some(&shown.reply.request) == self.frame_request().as_ref();
         is_full.then(|| {
-            let other = self.view.stages().into_iter().find(|stage| *stage != Stage::Oracle);
+            let other = self.view.stages().into_iter().find(|stage| *stage != Stage::Reference);
             let picture = other.and_then(|stage| {
                 shown.reply.pictures.iter().find(|picture: &&Arc<Picture>| picture.stage == stage)
             });
-            let compares = self.view.compare == Compare::Difference && self.view.wants_oracle();
+            let compares = self.view.compare == Compare::Difference && self.view.wants_reference();
             let against = picture.filter(|_| compares).map(|picture| (picture.clone(), self.view.gain));
-            OracleRequest {
+            ReferenceRequest {
                 sequence: sequence.clone(),
-                frame: self.view.wants_oracle().then_some(shown.reply.frame),
+                frame: self.view.wants_reference().then_some(shown.reply.frame),
                 against,
             }
         })

@@ -139,16 +139,16 @@ impl View {
         if self.compare == Compare::Single || self.a == self.b { vec![self.a] } else { vec![self.a, self.b] }
     }
 
-    /// Whether the oracle's picture is shown.
-    pub fn wants_oracle(&self) -> bool {
-        self.stages().contains(&Stage::Oracle)
+    /// Whether the reference's picture is shown.
+    pub fn wants_reference(&self) -> bool {
+        self.stages().contains(&Stage::Reference)
     }
 
-    /// The stages to render: those shown without the oracle, or the photometric one, which is shown until the
-    /// oracle's picture is ready.
+    /// The stages to render: those shown without the reference, or the photometric one, which is shown until the
+    /// reference's picture is ready.
     pub fn rendered_stages(&self) -> Vec<Stage> {
         let mut stages = self.stages();
-        stages.retain(|stage| *stage != Stage::Oracle);
+        stages.retain(|stage| *stage != Stage::Reference);
         if stages.is_empty() {
             stages.push(Stage::Photometric);
         }
@@ -167,10 +167,10 @@ mod tests {
                 for compare in Compare::ALL {
                     let view = View { a, b, compare, ..View::default() };
                     let stages = view.rendered_stages();
-                    assert!(!stages.is_empty() && !stages.contains(&Stage::Oracle), "{view:?}");
+                    assert!(!stages.is_empty() && !stages.contains(&Stage::Reference), "{view:?}");
                     assert_eq!(
-                        view.wants_oracle(),
-                        a == Stage::Oracle || (compare != Compare::Single && b == Stage::Oracle),
+                        view.wants_reference(),
+                        a == Stage::Reference || (compare != Compare::Single && b == Stage::Reference),
                         "{view:?}"
                     );
                 }

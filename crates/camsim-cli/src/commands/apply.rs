@@ -307,7 +307,7 @@ fn in_file(args: &ApplyArgs, error: &ApplyError) -> anyhow::Error {
         | ApplyError::PointSpread => &args.camera,
         ApplyError::Frame { .. } | ApplyError::Motion(_) | ApplyError::Fog => &args.frame,
         ApplyError::Flow => return anyhow!("{error}"),
-        ApplyError::Oracle => return anyhow!("--solver: {error}"),
+        ApplyError::Reference => return anyhow!("--solver: {error}"),
     };
     anyhow!("{}: {error}", file.display())
 }

@@ -68,9 +68,9 @@ pub fn run(args: &ExplainArgs, console: &mut Console<'_>) -> Result<(), Failure>
             frames,
         }));
     }
-    if scenario.quality.solver == Auto::Value(Solver::Oracle) {
+    if scenario.quality.solver == Auto::Value(Solver::Reference) {
         console.warn(
-            "quality.solver is \"oracle\": `render` casts every ray without a plan; this is the plan \
+            "quality.solver is \"reference\": `render` casts every ray without a plan; this is the plan \
                    of the default solver",
         );
     }

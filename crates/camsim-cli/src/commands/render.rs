@@ -69,7 +69,7 @@ pub struct RenderArgs {
     camera: Vec<String>,
     #[command(flatten)]
     changes: Changes,
-    /// Renderer [default: gpu on a graphics card, cpu elsewhere, reference if quality.solver is "oracle"]
+    /// Renderer [default: gpu on a graphics card, cpu elsewhere, reference if quality.solver is "reference"]
     #[arg(long, value_enum)]
     backend: Option<RenderBackend>,
     /// Channels, instead of output.channels
@@ -115,7 +115,7 @@ pub enum RenderBackend {
     /// The graphics adapter alone, a software adapter where there is no card
     Gpu,
     /// The slow exact renderer: one ray per sample, in f64 on the CPU. It is equivalent to quality.solver =
-    /// "oracle", and excludes other solvers and the paper's preset
+    /// "reference", and excludes other solvers and the paper's preset
     Reference,
 }
 
@@ -236,7 +236,7 @@ fn with_backend(scenario: Scenario, backend: Option<RenderBackend>) -> Result<Sc
         Some(RenderBackend::Reference) => with_reference(scenario),
         Some(RenderBackend::Cpu | RenderBackend::Gpu) if is_reference(&scenario) => {
             Err(Failure::bad_input(anyhow!(
-                "quality.solver is \"oracle\", which only --backend reference has: leave --backend out, or \
+                "quality.solver is \"reference\", which only --backend reference has: leave --backend out, or \
                  change the solver (--set quality.solver=auto)"
             )))
         }

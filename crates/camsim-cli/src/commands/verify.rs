@@ -74,7 +74,7 @@ pub struct VerifyArgs {
 /// Measures and compares.
 pub fn run(args: &VerifyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read(console)?;
-    if scenario.quality.solver == Auto::Value(Solver::Oracle) {
+    if scenario.quality.solver == Auto::Value(Solver::Reference) {
         return Err(VerifyError::Solver.into());
     }
     let loaded = inputs::load(&scenario, console)?;

@@ -52,7 +52,7 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
         resume_command: resume_command(&job.folder),
     };
     let engine;
-    let is_exact = job.rig.first().quality.solver == Auto::Value(Solver::Oracle);
+    let is_exact = job.rig.first().quality.solver == Auto::Value(Solver::Reference);
     let mut source: Box<dyn FrameSource + '_> = if is_exact {
         Box::new(ReferenceSource::new(selected.first())?)
     } else {

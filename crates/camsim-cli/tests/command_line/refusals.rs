@@ -90,10 +90,10 @@ fn invalid_input_is_refused_with_position_and_remedy() {
         (vec!["render", &scenario, "--format", "none,png"], "cannot be combined with other formats"),
         (vec!["render", &scenario, "--preset", "paper", "--set", "quality.solver=linear"], "quality.solver"),
         (
-            vec!["render", &scenario, "--backend", "gpu", "--set", "quality.solver=oracle"],
+            vec!["render", &scenario, "--backend", "gpu", "--set", "quality.solver=reference"],
             "leave --backend out",
         ),
-        (vec!["verify", &scenario, "--set", "quality.solver=oracle"], "the reference of this command"),
+        (vec!["verify", &scenario, "--set", "quality.solver=reference"], "which this command compares with"),
         (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
         (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),
         (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),

@@ -35,9 +35,9 @@ pub enum ApplyError {
     Flow,
     /// A solver that needs a scene.
     #[error(
-        "solver \"oracle\" needs a scene, which an ideal frame does not have: use \"reproject\" (exact up to what the frame shows)"
+        "solver \"reference\" needs a scene, which an ideal frame does not have: use \"reproject\" (exact up to what the frame shows)"
     )]
-    Oracle,
+    Reference,
     /// Linear fog without the paper's preset.
     #[error(
         "linear fog after the blur belongs to the paper's methods (otherwise fog is part of the ideal frame): use the preset \"paper\", or leave fog out"

@@ -262,7 +262,7 @@ fn invalid_frames_are_refused() {
         error(&IdealFrame { color_rgba: vec![f32::INFINITY; 48], ..good.clone() }, &Settings::default())
             .contains("colours")
     );
-    assert!(error(&good, &solver(Solver::Oracle)).contains("reproject"));
+    assert!(error(&good, &solver(Solver::Reference)).contains("reproject"));
     // A ray more than 90 deg from the axis of the ideal camera has no source and causes no panic.
     let about =
         Motion::Twist(Twist { rate_rad_s: DVec3::new(0.0, 300.0, 0.0), velocity_m_s: DVec3::splat(1e9) });

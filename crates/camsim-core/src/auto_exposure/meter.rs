@@ -13,7 +13,7 @@ use crate::{
     camera::{CameraError, CameraModel, ZoomTable},
     photometric::vignette_weights,
     pose::CameraPose,
-    reference::{Hit, Oracle, zoom_at},
+    reference::{Hit, ReferenceRenderer, zoom_at},
     scenario::{AutoExposureSpec, MeterWeights},
     scene::LUMINANCE_F64,
     sequence::Sequence,
@@ -31,7 +31,7 @@ const SAME_FACE: f64 = 0.99;
 /// The meter of a camera.
 #[derive(Debug)]
 pub(super) struct Meter {
-    oracle: Oracle,
+    reference: ReferenceRenderer,
     lens: MeterLens,
     shutter: Shutter,
     points: Vec<MeterPoint>,
@@ -108,7 +108,7 @@ impl Meter {
         let cells = DVec2::new(COLUMNS as f64, ROWS as f64);
         let size_px = DVec2::from_array(sequence.scenario.camera.size_px.map(f64::from));
         let cell_px = DVec2::new(right - left, bottom - top) * size_px / cells;
-        Self { oracle: Oracle::of_scene(sequence), lens, shutter, points, cell_px }
+        Self { reference: ReferenceRenderer::of_scene(sequence), lens, shutter, points, cell_px }
     }
 
     /// Light of the picture of a frame.
@@ -125,7 +125,7 @@ impl Meter {
 
     /// What the points of a frame see; `None` without a ray.
     fn seen(&self, frame: u64) -> Vec<Option<Seen>> {
-        let sequence = self.oracle.sequence();
+        let sequence = self.reference.sequence();
         let stamp_s = sequence.stamp_s(frame as f64);
         let zoomed = match &self.lens {
             MeterLens::Fixed(_) => None,
@@ -146,7 +146,7 @@ impl Meter {
             };
             last = Some((t_s, pose));
             let ray_ned = pose.ned_from_camera * ray;
-            Some(Seen { ray_ned, pose, t_s, hit: self.oracle.lit(t_s, pose.position_ned_m, ray_ned) })
+            Some(Seen { ray_ned, pose, t_s, hit: self.reference.lit(t_s, pose.position_ned_m, ray_ned) })
         };
         self.points.iter().map(see).collect()
     }
@@ -154,20 +154,20 @@ impl Meter {
     /// Adds the light of the cell of point `i`.
     fn read(&self, light: &mut MeteredLight, here: &Seen, all: &[Option<Seen>], i: usize) {
         let point = &self.points[i];
-        if self.oracle.has_blended() {
-            let color = self.oracle.radiance_along(here.t_s, here.pose.position_ned_m, here.ray_ned, 1.0);
+        if self.reference.has_blended() {
+            let color = self.reference.radiance_along(here.t_s, here.pose.position_ned_m, here.ray_ned, 1.0);
             return light.add(color, point, 1.0);
         }
         let sides = here.hit.and_then(|hit| Some((hit, self.sides(&hit, all, i)?)));
         let Some((hit, sides)) = sides else {
-            return light.add(self.oracle.light_of(here.hit.as_ref()), point, 1.0);
+            return light.add(self.reference.light_of(here.hit.as_ref()), point, 1.0);
         };
         let position = |k: u32| (f64::from(k) + 0.5) / f64::from(READS) - 0.5;
         for j in 0..READS {
             for k in 0..READS {
                 let uv = DVec2::from_array(hit.texture_uv) + sides * DVec2::new(position(k), position(j));
                 let hit = Hit { texture_uv: uv.to_array(), ..hit };
-                light.add(self.oracle.light_of(Some(&hit)), point, 1.0 / f64::from(READS * READS));
+                light.add(self.reference.light_of(Some(&hit)), point, 1.0 / f64::from(READS * READS));
             }
         }
     }

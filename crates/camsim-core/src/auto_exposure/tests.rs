@@ -12,7 +12,7 @@ use crate::{
     mount::CameraPath,
     photometric::GrayImage,
     pose::BodyState,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{
         AutoExposureSpec, ExposureStart, FlightSpec, ImageSensorSpec, LensModel, LensSpec, Mosaic, MountSpec,
         Scenario, ShutterSpec,
@@ -79,7 +79,7 @@ fn track(sequence: &Sequence) -> ExposureTrack {
 
 fn render(sequence: &Arc<Sequence>, frame: u64) -> RenderedFrame {
     let options = RenderOptions { tolerance_dn: 1.0, ..RenderOptions::default() };
-    Oracle::new(sequence.clone()).expect("an oracle").render(frame, &options)
+    ReferenceRenderer::new(sequence.clone()).expect("a reference").render(frame, &options)
 }
 
 /// Mean luminance of a picture over the pixels that have a ray.

@@ -45,7 +45,7 @@ pub(super) fn find(t_s: &[f64], channel: &impl OutlierSignal, floor: f64) -> Vec
     };
     let deviations: Vec<f64> = (1..count - 1).map(|row| deviation_of(row, row - 1, row + 1)).collect();
     let threshold = floor.max(TYPICAL_FACTOR * quantile(&deviations, TYPICAL_QUANTILE));
-    // The rows next to a fault deviate as well, so the nearest ones are left out of the median.
+    // The rows next to a fault deviate as well, so the nearest ones do not count in the median.
     let nearby_median = |first: usize, last: usize| {
         let range = first.saturating_sub(7)..(last + 6).min(deviations.len());
         let nearby: Vec<f64> = range.filter(|&i| i + 2 < first || i > last).map(|i| deviations[i]).collect();

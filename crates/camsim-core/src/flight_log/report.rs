@@ -132,8 +132,8 @@ impl CleaningReport {
     fn findings(&self) -> [(&'static str, &Finding); 9] {
         [
             ("rows without usable time or position dropped", &self.unusable),
-            ("rows without a fix (latitude or longitude 0) left out", &self.null_fixes),
-            ("rows without a height (0, far from the others) left out", &self.null_heights),
+            ("rows without a fix (latitude or longitude 0) skipped", &self.null_fixes),
+            ("rows without a height (0, far from the others) skipped", &self.null_heights),
             ("rows out of order sorted", &self.out_of_order),
             ("missing attitudes interpolated", &self.attitude_missing),
             ("attitude glitches interpolated", &self.attitude_glitches),

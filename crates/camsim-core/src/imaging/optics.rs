@@ -103,7 +103,7 @@ fn simple_model(camera: &CameraSpec) -> CameraSpec {
 
 impl Optics {
     /// The optics of a camera with `[camera.point_spread]`. `seed` is the scenario's. A kernel whose file has
-    /// not been read is left out; [`crate::camera::CameraModel::from_spec`] refuses it.
+    /// not been read is ignored; [`crate::camera::CameraModel::from_spec`] refuses it.
     #[must_use]
     pub fn new(camera: &CameraSpec, seed: u64) -> Option<Self> {
         OpticsKey::new(camera, seed).map(Self::of_key)

@@ -6,7 +6,7 @@ use glam::{DMat2, DVec2, DVec3};
 
 use super::{FoldCurve, Lens, LensModel, RadialTable, direction::gradient_of_plane};
 
-/// Lenses that share an inverse. The functions are those of [`Lens`]; what is left out is as of the lens that it
+/// Lenses that share an inverse. The functions are those of [`Lens`]; what is omitted is as of the lens that it
 /// alters, or else as of a pinhole. A class has a [`LensClass::distort`] or an [`LensClass::image`] of its own, and a
 /// [`LensClass::jacobian`] or a [`LensClass::gradient`].
 pub(super) trait LensClass {

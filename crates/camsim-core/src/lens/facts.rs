@@ -14,7 +14,7 @@ pub(crate) type Domain = (&'static str, (Bound<f64>, Bound<f64>), &'static str);
 pub struct ModelFacts {
     /// Names of the coefficients, in order.
     pub coefficients: &'static [&'static str],
-    /// Values of coefficients that are left out; empty: zeros.
+    /// Values of coefficients that are omitted; empty: zeros.
     pub(super) defaults: &'static [f64],
     /// What to do with more coefficients than these.
     pub fix: &'static str,
@@ -74,7 +74,7 @@ impl ModelFacts {
         (given.len() <= self.coefficients.len()).then(all)
     }
 
-    /// A coefficient, or its default where it is left out.
+    /// A coefficient, or its default where it is omitted.
     pub(crate) fn or_default(&self, given: &[f64], i: usize) -> f64 {
         given.get(i).or(self.defaults.get(i)).copied().unwrap_or(0.0)
     }

@@ -11,7 +11,7 @@ use crate::{
     imaging::{LensTransfer, Optics},
     mount::CameraPath,
     pose::BodyState,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{CameraSpec, FlightSpec, MountSpec, PhotometricSpec, Scenario, SceneSpec, ShutterSpec},
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
@@ -135,7 +135,7 @@ pub fn picture_mtf(camera: &CameraSpec, picture: &EdgePicture) -> Result<CameraM
 }
 
 /// Renders a straight edge in the middle of a camera's picture: through its lens, by rays over the area of
-/// each pixel, and through its point spread. Exposure, vignette, noise and sensor are left out, and of a zoom
+/// each pixel, and through its point spread. Exposure, vignette, noise and sensor are not applied, and of a zoom
 /// lens its zoom table.
 ///
 /// # Errors
@@ -150,7 +150,7 @@ pub fn slanted_edge(camera: &CameraSpec) -> Result<EdgePicture, EdgeError> {
         max_samples: 8192,
         ..RenderOptions::default()
     };
-    let mut frame = Oracle::new(sequence)?.render(0, &options);
+    let mut frame = ReferenceRenderer::new(sequence)?.render(0, &options);
     if let Some(optics) = Optics::new(&window, 0) {
         optics.spread(frame.color_rgba_mut());
     }

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::Oracle;
+use super::ReferenceRenderer;
 use crate::pose::CameraPose;
 
 /// Number of rays of a frame, and of those whose points are occluded in every ideal frame.
@@ -26,15 +26,21 @@ impl Disocclusion {
 /// Counts disoccluded rays over the centres of all pixels at the given exposure phases (-0.5 to 0.5), for
 /// ideal frames at the poses `keys`.
 #[must_use]
-pub fn disocclusion(oracle: &Oracle, frame: u64, keys: &[CameraPose], phases: &[f64]) -> Disocclusion {
-    let [width, height] = oracle.sequence.scenario.camera.size_px;
-    let view = oracle.view(frame);
+pub fn disocclusion(
+    reference: &ReferenceRenderer,
+    frame: u64,
+    keys: &[CameraPose],
+    phases: &[f64],
+) -> Disocclusion {
+    let [width, height] = reference.sequence.scenario.camera.size_px;
+    let view = reference.view(frame);
     let of_row = |y: u32| {
         let samples = (0..width).flat_map(|x| phases.iter().map(move |&phase| (x, phase)));
         let mut row = Disocclusion::default();
         for sample in samples.filter_map(|(x, phase)| view.sample([x, y], DVec2::ZERO, phase)) {
-            let hidden =
-                |point| keys.iter().all(|key| oracle.is_occluded_at(sample.t_s, key.position_ned_m, point));
+            let hidden = |point| {
+                keys.iter().all(|key| reference.is_occluded_at(sample.t_s, key.position_ned_m, point))
+            };
             row.rays += 1;
             row.hidden += u64::from(sample.hit.is_some_and(|hit| hidden(hit.point_ned_m)));
         }

@@ -1,4 +1,4 @@
-//! Flow, motion and blur path of the oracle: where another picture shows what a pixel sees, by a search over
+//! Flow, motion and blur path of the reference: where another picture shows what a pixel sees, by a search over
 //! the instants of that picture's rows.
 //!
 //! The equation `position = project(camera(t(position)), point(t(position)))` along the readout is looked at in
@@ -7,7 +7,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{FrameLens, FrameView, Oracle, RaySample, zoom_at};
+use super::{FrameLens, FrameView, RaySample, ReferenceRenderer, zoom_at};
 use crate::{
     pose::CameraPose,
     scenario::{FlowInstant, FlowState},
@@ -36,7 +36,7 @@ enum Goal<'a> {
 /// A picture that flow leads to.
 #[derive(Debug)]
 pub(super) struct FlowPicture<'a> {
-    oracle: &'a Oracle,
+    reference: &'a ReferenceRenderer,
     lens: FrameLens<'a>,
     stamp_s: f64,
     /// All rows at one instant.
@@ -67,7 +67,7 @@ fn changes_sign(a: Miss, b: Miss) -> bool {
     a.1.zip(b.1).is_some_and(|(a, b)| (a >= 0.0) != (b >= 0.0))
 }
 
-impl Oracle {
+impl ReferenceRenderer {
     /// The picture of a frame of any number.
     pub(super) fn flow_frame(&self, frame: i64) -> FlowPicture<'_> {
         let stamp_s = self.timing.stamp_of(frame);
@@ -88,7 +88,7 @@ impl Oracle {
             }
         };
         FlowPicture {
-            oracle: self,
+            reference: self,
             lens: self.lens_of(stamp_s),
             stamp_s,
             global_s: None,
@@ -101,7 +101,7 @@ impl Oracle {
         let stamp_s = self.timing.stamp_s(frame);
         let dt_s = self.timing.instant_s(instant);
         let lens = self.lens_of(stamp_s);
-        FlowPicture { oracle: self, lens, stamp_s, global_s: Some(stamp_s + dt_s), fields: Vec::new() }
+        FlowPicture { reference: self, lens, stamp_s, global_s: Some(stamp_s + dt_s), fields: Vec::new() }
     }
 
     pub(super) fn lens_of(&self, stamp_s: f64) -> FrameLens<'_> {
@@ -164,7 +164,7 @@ impl FrameLens<'_> {
 impl FlowPicture<'_> {
     /// Displacement of what a pixel sees, pixels, and state: the channels `flow`, `flow_back` and `flow_global`.
     pub(super) fn flow(&self, from_px: DVec2, seen: &RaySample) -> (DVec2, FlowState) {
-        let goal = self.oracle.goal(seen);
+        let goal = self.reference.goal(seen);
         let mut sightings = self.sightings(goal);
         sightings.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
         let Some(nearest) = sightings.first() else {
@@ -185,24 +185,24 @@ impl FlowPicture<'_> {
     /// Whether something is in front of a goal where the picture shows it.
     fn is_hidden(&self, goal: Goal<'_>, sighting: &Sighting) -> bool {
         let direction = goal.direction_from(&sighting.pose, sighting.t_s);
-        let hit = self.oracle.cast_at(sighting.t_s, sighting.pose.position_ned_m, direction);
+        let hit = self.reference.cast_at(sighting.t_s, sighting.pose.position_ned_m, direction);
         // The parameter is 1 at the goal; the sky is infinitely far away.
         hit.is_some_and(|hit| matches!(goal, Goal::Sky(_)) || hit.depth_m < 1.0 - 1e-6)
     }
 
     fn is_in_picture(&self, px: DVec2) -> bool {
-        let [width, height] = self.oracle.sequence.scenario.camera.size_px.map(f64::from);
+        let [width, height] = self.reference.sequence.scenario.camera.size_px.map(f64::from);
         px.x >= -0.5 && px.y >= -0.5 && px.x < width - 0.5 && px.y < height - 0.5
     }
 
     fn along(&self, px: DVec2) -> f64 {
-        if self.oracle.timing.reads_rows() { px.y } else { px.x }
+        if self.reference.timing.reads_rows() { px.y } else { px.x }
     }
 
     /// All positions in the picture at which it shows a goal.
     fn sightings(&self, goal: Goal<'_>) -> Vec<Sighting> {
         if let Some(t_s) = self.global_s {
-            let pose = self.oracle.sequence.path.pose(t_s);
+            let pose = self.reference.sequence.path.pose(t_s);
             let px = self.lens.show(&pose, t_s, goal).filter(|px| self.is_in_picture(*px));
             return px.map(|px| Sighting { px, t_s, pose }).into_iter().collect();
         }
@@ -315,18 +315,18 @@ impl FlowPicture<'_> {
     }
 
     fn camera(&self, field: &FieldScan, along_px: f64) -> (f64, CameraPose) {
-        let t_s = self.stamp_s + self.oracle.timing.dt_along_s(along_px, field.row);
-        (t_s, self.oracle.sequence.path.pose(t_s))
+        let t_s = self.stamp_s + self.reference.timing.dt_along_s(along_px, field.row);
+        (t_s, self.reference.sequence.path.pose(t_s))
     }
 
     /// Where the camera of the row read first or last shows a goal that no row shows: of both, and of both
     /// fields, that which misses its row by less.
     fn outside(&self, goal: Goal<'_>, from_px: DVec2) -> Option<DVec2> {
         if let Some(t_s) = self.global_s {
-            return self.lens.show(&self.oracle.sequence.path.pose(t_s), t_s, goal);
+            return self.lens.show(&self.reference.sequence.path.pose(t_s), t_s, goal);
         }
         let ends = self.fields.iter().flat_map(|field| {
-            let [first, last, step] = self.oracle.ends_of_field(field.row);
+            let [first, last, step] = self.reference.ends_of_field(field.row);
             [first, last].into_iter().filter_map(move |line| {
                 let (t_s, pose) = self.camera(field, f64::from(line));
                 let px = self.lens.show(&pose, t_s, goal)?;
@@ -361,6 +361,6 @@ impl FrameView<'_> {
     }
 
     fn show_at(&self, seen: &RaySample, t_s: f64) -> Option<DVec2> {
-        self.lens.show(&self.oracle.sequence.path.pose(t_s), t_s, self.oracle.goal(seen))
+        self.lens.show(&self.reference.sequence.path.pose(t_s), t_s, self.reference.goal(seen))
     }
 }

@@ -1,15 +1,15 @@
-//! Errors of a frame's flows, motion, blur path and coverage against the oracle.
+//! Errors of a frame's flows, motion, blur path and coverage against the reference.
 //!
-//! These cost the oracle up to a thousand evaluations a pixel, so that large frames are sampled.
+//! These cost the reference up to a thousand evaluations a pixel, so that large frames are sampled.
 
 use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    Oracle, RaySample,
+    RaySample, ReferenceRenderer,
     plane_errors::{Compared, at_fraction, beside_offsets},
-    planes::{self, PlaneOracle},
+    planes::{self, PlaneReference},
 };
 use crate::{
     frame::RenderedFrame,
@@ -21,8 +21,8 @@ use crate::{
 pub const FLOW_TOLERANCE_PX: f64 = 0.01;
 /// Fraction of its length by which a motion may be off, and what is added to it, pixels a second.
 pub const MOTION_TOLERANCE: (f64, f64) = (1e-3, 0.05);
-/// Difference of a coverage from that by the oracle's 256 rays from which on it is wrong: the largest error of
-/// 64 rays at a straight border is 0.1, and that of the oracle half of it.
+/// Difference of a coverage from that by the reference's 256 rays from which on it is wrong: the largest error of
+/// 64 rays at a straight border is 0.1, and that of the reference half of it.
 pub const COVERAGE_TOLERANCE: f64 = 0.15;
 /// States of a flow.
 const STATES: usize = 5;
@@ -56,7 +56,7 @@ pub struct FlowErrors {
     pub away: FlowStats,
     /// The others.
     pub near: FlowStats,
-    /// Pixels by the state that the oracle has (row) and that of the frame (column); all 0 for motion and blur
+    /// Pixels by the state that the reference has (row) and that of the frame (column); all 0 for motion and blur
     /// path.
     pub states: [[u64; STATES]; STATES],
     /// Pixels that are off by more than the tolerance, or have another state.
@@ -99,7 +99,7 @@ struct PixelError {
 /// fault, because both sides of a border that near are acceptable. Empty if the size differs from that of the sequence.
 #[must_use]
 pub fn flow_errors(
-    oracle: &Oracle,
+    reference: &ReferenceRenderer,
     number: u64,
     frame: &RenderedFrame,
     near_px: f64,
@@ -107,7 +107,7 @@ pub fn flow_errors(
 ) -> Vec<FlowErrors> {
     let is_flow = |channel: &Channel| matches!(channel.facts().check, Check::Displacement | Check::Velocity);
     let channels: Vec<Channel> = frame.planes.iter().map(|plane| plane.channel).filter(is_flow).collect();
-    let compared = if channels.is_empty() { None } else { Compared::new(oracle, number, frame, near_px) };
+    let compared = if channels.is_empty() { None } else { Compared::new(reference, number, frame, near_px) };
     let Some(compared) = compared else { return Vec::new() };
     let valid: Vec<usize> = (0..compared.samples.len()).filter(|&i| compared.samples[i].is_some()).collect();
     let chosen = chosen(&valid, most);
@@ -117,7 +117,7 @@ pub fn flow_errors(
         if values.len() != parts * compared.samples.len() {
             return None;
         }
-        let flows = Flows { parts, check: channel.facts().check, oracle: compared.oracle(channel) };
+        let flows = Flows { parts, check: channel.facts().check, reference: compared.reference(channel) };
         let found =
             |i: usize| std::array::from_fn(|k| if k < parts { values[parts * i + k].into() } else { 0.0 });
         let of_pixel = |&i: &usize| flows.error(&compared, i, displacement(found(i), parts));
@@ -179,11 +179,11 @@ fn errors_of(channel: Channel, of_pixels: u64, pixels: &[PixelError]) -> FlowErr
     }
 }
 
-/// A channel of a frame, by the oracle.
+/// A channel of a frame, by the reference.
 struct Flows<'a> {
     parts: usize,
     check: Check,
-    oracle: PlaneOracle<'a>,
+    reference: PlaneReference<'a>,
 }
 
 impl Flows<'_> {
@@ -209,7 +209,7 @@ impl Flows<'_> {
     }
 
     fn value(&self, pixel: [u32; 2], offset: DVec2, seen: &RaySample) -> Value {
-        displacement(self.oracle.value(pixel, offset, seen), self.parts)
+        displacement(self.reference.value(pixel, offset, seen), self.parts)
     }
 
     fn is_same(&self, wanted: Value, found: Value) -> bool {
@@ -237,13 +237,13 @@ fn distance(wanted: Value, found: Value) -> Option<f64> {
 /// the size differs from that of the sequence.
 #[must_use]
 pub fn coverage_errors(
-    oracle: &Oracle,
+    reference: &ReferenceRenderer,
     number: u64,
     frame: &RenderedFrame,
     most: usize,
 ) -> Option<CoverageErrors> {
     let values = frame.floats(Channel::Coverage)?;
-    let compared = Compared::new(oracle, number, frame, 0.0)?;
+    let compared = Compared::new(reference, number, frame, 0.0)?;
     let is_valid = |i: &usize| compared.samples[*i].is_some() && *i < values.len();
     let valid: Vec<usize> = (0..compared.samples.len()).filter(is_valid).collect();
     let mixed: Vec<usize> = valid.iter().copied().filter(|&i| values[i] < 1.0).collect();

@@ -37,8 +37,8 @@ pub(super) struct RowLamps<'a> {
 
 impl<'a> RowLamps<'a> {
     pub(super) fn new(view: &'a FrameView<'a>, y: u32, width: u32) -> Self {
-        let oracle = view.oracle;
-        let lamps = oracle.lamps.iter().map(|&mesh| &oracle.sequence.scene.meshes[mesh]);
+        let reference = view.reference;
+        let lamps = reference.lamps.iter().map(|&mesh| &reference.sequence.scene.meshes[mesh]);
         let ends = [[0, y], [width.saturating_sub(1), y]];
         let [first, last] = ends.map(|pixel| [view.mid_s(pixel), 0.5 * view.exposure_s(pixel)]);
         let begin_s = (first[0] - first[1]).min(last[0] - last[1]);
@@ -99,7 +99,7 @@ fn is_within(seen: &Seen, ray: DVec3, reach: f64) -> bool {
 
 /// A lamp at instants of path time, seconds.
 fn of_lamp(view: &FrameView<'_>, mesh: &Mesh, instants_s: &[f64]) -> Vec<Seen> {
-    let path = &view.oracle.sequence.path;
+    let path = &view.reference.sequence.path;
     let mut seen: Vec<Seen> = instants_s
         .iter()
         .map(|&t_s| {

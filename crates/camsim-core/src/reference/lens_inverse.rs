@@ -1,4 +1,4 @@
-//! Lens inverse of the oracle: from a pixel to the ideal ray on the principal branch, using nothing but the
+//! Lens inverse of the reference: from a pixel to the ideal ray on the principal branch, using nothing but the
 //! forward function of the lens and its Jacobian.
 
 use glam::{DMat2, DVec2};

@@ -1,4 +1,4 @@
-//! Errors of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame,
+//! Errors of a rendered frame against the reference: of its source coordinates, in pixels of its ideal frame,
 //! and of its colour.
 
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{IdealView, Oracle, RaySample};
+use super::{IdealView, RaySample, ReferenceRenderer};
 use crate::{
     frame::RenderedFrame,
     silhouette::{CREASE, NEAR_PX, bends, may_step, steps},
@@ -53,7 +53,7 @@ impl ErrorStats {
     }
 }
 
-/// Errors of the source coordinates of a frame against those of the oracle.
+/// Errors of the source coordinates of a frame against those of the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CoordErrors {
     /// All pixels that have a source in both.
@@ -62,9 +62,9 @@ pub struct CoordErrors {
     pub smooth: ErrorStats,
     /// All other pixels.
     pub silhouettes: ErrorStats,
-    /// Number of pixels with a ray in the frame but not in the oracle.
+    /// Number of pixels with a ray in the frame but not in the reference.
     pub falsely_valid: u64,
-    /// Number of pixels with a ray in the oracle but not in the frame.
+    /// Number of pixels with a ray in the reference but not in the frame.
     pub missing: u64,
 }
 
@@ -115,11 +115,11 @@ enum ComparedPixel {
     Error { px: f64, at_silhouette: bool },
 }
 
-/// What the oracle sees at the centre of every pixel of a frame, and which pixels are at silhouettes.
+/// What the reference sees at the centre of every pixel of a frame, and which pixels are at silhouettes.
 /// Computed once, it is compared with any number of renderings.
 #[derive(Debug)]
 pub struct CoordTruth {
-    oracle: Arc<Oracle>,
+    reference: Arc<ReferenceRenderer>,
     samples: Vec<Option<RaySample>>,
     near: Vec<bool>,
 }
@@ -127,10 +127,10 @@ pub struct CoordTruth {
 impl CoordTruth {
     /// Samples a frame at exposure phase `phase` (-0.5 to 0.5).
     #[must_use]
-    pub fn new(oracle: Arc<Oracle>, frame: u64, phase: f64) -> Self {
-        let samples = pixel_samples(&oracle, frame, phase);
-        let near = dilated(&oracle, &edges(&oracle, &samples));
-        Self { oracle, samples, near }
+    pub fn new(reference: Arc<ReferenceRenderer>, frame: u64, phase: f64) -> Self {
+        let samples = pixel_samples(&reference, frame, phase);
+        let near = dilated(&reference, &edges(&reference, &samples));
+        Self { reference, samples, near }
     }
 
     /// Mask of the pixels within 3 px of a silhouette, row-major.
@@ -147,30 +147,30 @@ impl CoordTruth {
     /// As [`coord_errors`], for a rendering of this frame.
     #[must_use]
     pub fn errors(&self, ideal: &IdealView, frame: &RenderedFrame, step: u32) -> Option<CoordErrors> {
-        compared(&self.oracle, &self.samples, &self.near, ideal, frame, step)
+        compared(&self.reference, &self.samples, &self.near, ideal, frame, step)
     }
 }
 
 /// Compares `coords` of frame `number`, rendered from the ideal frame `ideal` at exposure phase `phase`, with
-/// the oracle. The true source is the projection into the ideal frame of the point that the pixel's ray hits.
+/// the reference. The true source is the projection into the ideal frame of the point that the pixel's ray hits.
 /// Every `step`-th pixel in both directions is compared. A pixel counts as at a silhouette within 3 px of
 /// one, and where its point is hidden from the key camera or behind it. `None` without coords, or if the size
 /// differs from that of the sequence.
 #[must_use]
 pub fn coord_errors(
-    oracle: &Oracle,
+    reference: &ReferenceRenderer,
     number: u64,
     ideal: &IdealView,
     frame: &RenderedFrame,
     phase: f64,
     step: u32,
 ) -> Option<CoordErrors> {
-    let samples = pixel_samples(oracle, number, phase);
-    compared(oracle, &samples, &dilated(oracle, &edges(oracle, &samples)), ideal, frame, step)
+    let samples = pixel_samples(reference, number, phase);
+    compared(reference, &samples, &dilated(reference, &edges(reference, &samples)), ideal, frame, step)
 }
 
 fn compared(
-    oracle: &Oracle,
+    reference: &ReferenceRenderer,
     samples: &[Option<RaySample>],
     near: &[bool],
     ideal: &IdealView,
@@ -180,7 +180,7 @@ fn compared(
     let (coords, color_rgba) = (frame.coords()?, frame.color_rgba());
     let [width, height] = frame.size_px;
     let pixels = width as usize * height as usize;
-    if frame.size_px != oracle.sequence.scenario.camera.size_px
+    if frame.size_px != reference.sequence.scenario.camera.size_px
         || coords.len() != pixels
         || color_rgba.len() != 4 * pixels
     {
@@ -196,7 +196,7 @@ fn compared(
                 let source_px = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
                 let unseen = ideal.in_key(sample).z <= 0.0
                     || sample.hit.is_some_and(|hit| {
-                        oracle.is_occluded_at(sample.t_s, ideal.pose.position_ned_m, hit.point_ned_m)
+                        reference.is_occluded_at(sample.t_s, ideal.pose.position_ned_m, hit.point_ned_m)
                     });
                 ComparedPixel::Error {
                     px: source_px.distance(ideal.source_px(sample)),
@@ -229,7 +229,7 @@ fn compared(
     Some(errors)
 }
 
-/// Colour errors of a frame against the oracle as PSNR, with a peak of 1, over the channels R, G, B of pixels
+/// Colour errors of a frame against the reference as PSNR, with a peak of 1, over the channels R, G, B of pixels
 /// that are valid in both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageErrors {
@@ -245,7 +245,7 @@ pub struct ImageErrors {
     pub max: f64,
 }
 
-/// Compares a frame with that of the oracle, both in linear light. `near` is the mask [`silhouettes`] of the
+/// Compares a frame with that of the reference, both in linear light. `near` is the mask [`silhouettes`] of the
 /// frame. `None` if the sizes differ.
 #[must_use]
 pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool]) -> Option<ImageErrors> {
@@ -284,21 +284,22 @@ pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool])
 /// Mask of the pixels within 3 px of a silhouette at any of the given exposure phases (-0.5 to 0.5),
 /// row-major.
 #[must_use]
-pub fn silhouettes(oracle: &Oracle, frame: u64, phases: &[f64]) -> Vec<bool> {
-    let size_px = oracle.sequence.scenario.camera.size_px;
+pub fn silhouettes(reference: &ReferenceRenderer, frame: u64, phases: &[f64]) -> Vec<bool> {
+    let size_px = reference.sequence.scenario.camera.size_px;
     let mut marked = vec![false; size_px[0] as usize * size_px[1] as usize];
     for &phase in phases {
-        for (marked, edge) in marked.iter_mut().zip(edges(oracle, &pixel_samples(oracle, frame, phase))) {
+        for (marked, edge) in marked.iter_mut().zip(edges(reference, &pixel_samples(reference, frame, phase)))
+        {
             *marked |= edge;
         }
     }
-    dilated(oracle, &marked)
+    dilated(reference, &marked)
 }
 
 /// Samples at the centres of all pixels.
-fn pixel_samples(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<RaySample>> {
-    let [width, height] = oracle.sequence.scenario.camera.size_px;
-    let view = oracle.view(frame);
+fn pixel_samples(reference: &ReferenceRenderer, frame: u64, phase: f64) -> Vec<Option<RaySample>> {
+    let [width, height] = reference.sequence.scenario.camera.size_px;
+    let view = reference.view(frame);
     (0..height)
         .into_par_iter()
         .flat_map_iter(|y| {
@@ -311,9 +312,9 @@ fn pixel_samples(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<RaySampl
 /// Mask of the pixels beside a step or at a crease of depth at their own instant. Where neighbouring samples
 /// suggest one, rays of the pixel's own camera decide: a neighbour belongs to another instant, or even to the
 /// other field, and may see another point.
-fn edges(oracle: &Oracle, samples: &[Option<RaySample>]) -> Vec<bool> {
-    let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
-    let field = oracle.timing.field_rows() as usize;
+fn edges(reference: &ReferenceRenderer, samples: &[Option<RaySample>]) -> Vec<bool> {
+    let [width, height] = reference.sequence.scenario.camera.size_px.map(|side| side as usize);
+    let field = reference.timing.field_rows() as usize;
     let inverse_depth = |sample: &RaySample| sample.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
     let beside = |before: usize, i: usize, after: usize| {
         let (Some(before), Some(here), Some(after)) = (&samples[before], &samples[i], &samples[after]) else {
@@ -325,7 +326,9 @@ fn edges(oracle: &Oracle, samples: &[Option<RaySample>]) -> Vec<bool> {
         }
         let towards = |other: &RaySample, fraction: f64| {
             let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, fraction).extend(1.0);
-            oracle.cast_at(here.t_s, here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
+            reference
+                .cast_at(here.t_s, here.pose.position_ned_m, direction)
+                .map_or(0.0, |hit| 1.0 / hit.depth_m)
         };
         let [a, c] = [before, after].map(|other| towards(other, 1.0));
         bends([a, here_w, c], CREASE)
@@ -348,9 +351,9 @@ fn edges(oracle: &Oracle, samples: &[Option<RaySample>]) -> Vec<bool> {
 }
 
 /// All pixels within 3 of a marked one along rows and columns of the same field.
-fn dilated(oracle: &Oracle, marked: &[bool]) -> Vec<bool> {
-    let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
-    let (near, field) = (NEAR_PX as usize, oracle.timing.field_rows() as usize);
+fn dilated(reference: &ReferenceRenderer, marked: &[bool]) -> Vec<bool> {
+    let [width, height] = reference.sequence.scenario.camera.size_px.map(|side| side as usize);
+    let (near, field) = (NEAR_PX as usize, reference.timing.field_rows() as usize);
     let mut rows = vec![false; marked.len()];
     let mut all = vec![false; marked.len()];
     for (i, _) in marked.iter().enumerate().filter(|(_, marked)| **marked) {

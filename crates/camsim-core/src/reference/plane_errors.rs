@@ -1,12 +1,12 @@
-//! Errors of a frame's ranges, normals and numbers of objects against the oracle, pixel by pixel, borders
+//! Errors of a frame's ranges, normals and numbers of objects against the reference, pixel by pixel, borders
 //! included.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    DEPTH_TOLERANCE, FrameView, Oracle, RaySample,
-    planes::{PlaneOracle, Value},
+    DEPTH_TOLERANCE, FrameView, RaySample, ReferenceRenderer,
+    planes::{PlaneReference, Value},
 };
 use crate::{
     frame::{Plane, PlaneValues, RenderedFrame},
@@ -21,14 +21,14 @@ const DIRECTIONS: u32 = 16;
 /// of a pixel, whose normals differ.
 const RINGS: [f64; 5] = [1e-3, 0.03, 0.3, 0.65, 1.0];
 
-/// Errors of a plane of a frame against the oracle.
+/// Errors of a plane of a frame against the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneErrors {
     /// The plane.
     pub channel: Channel,
     /// Pixels that are valid in both.
     pub pixels: u64,
-    /// Those of them of which no neighbour has, by the oracle, another object or the sky.
+    /// Those of them of which no neighbour has, by the reference, another object or the sky.
     pub pixels_away: u64,
     /// Pixels whose value is wrong: a range by more than [`DEPTH_TOLERANCE`] of it, a normal by more than
     /// [`NORMAL_TOLERANCE_RAD`], another number, or the sky in one of the two only.
@@ -60,8 +60,13 @@ fn tolerance(channel: Channel) -> Option<f64> {
 /// as well, because both sides of a border that near are acceptable. Empty if the size differs from that of the
 /// sequence.
 #[must_use]
-pub fn plane_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Vec<PlaneErrors> {
-    let Some(compared) = Compared::new(oracle, number, frame, near_px) else { return Vec::new() };
+pub fn plane_errors(
+    reference: &ReferenceRenderer,
+    number: u64,
+    frame: &RenderedFrame,
+    near_px: f64,
+) -> Vec<PlaneErrors> {
+    let Some(compared) = Compared::new(reference, number, frame, near_px) else { return Vec::new() };
     frame.planes.iter().filter_map(|plane| compared.errors(plane, tolerance(plane.channel)?)).collect()
 }
 
@@ -93,14 +98,19 @@ struct PixelError {
 
 impl<'a> Compared<'a> {
     /// `None` if the frame's size differs from that of the sequence.
-    pub(super) fn new(oracle: &'a Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Option<Self> {
+    pub(super) fn new(
+        reference: &'a ReferenceRenderer,
+        number: u64,
+        frame: &RenderedFrame,
+        near_px: f64,
+    ) -> Option<Self> {
         let [width, height] = frame.size_px;
         let count = width as usize * height as usize;
         let color_rgba = frame.color_rgba();
-        if frame.size_px != oracle.sequence.scenario.camera.size_px || color_rgba.len() != 4 * count {
+        if frame.size_px != reference.sequence.scenario.camera.size_px || color_rgba.len() != 4 * count {
             return None;
         }
-        let view = oracle.view(number);
+        let view = reference.view(number);
         let pixel = |i: usize| [i as u32 % width, i as u32 / width];
         let sample =
             |i: usize| view.sample(pixel(i), DVec2::ZERO, 0.0).filter(|_| color_rgba[4 * i + 3] > 0.0);
@@ -112,9 +122,9 @@ impl<'a> Compared<'a> {
         [i as u32 % self.size_px[0], i as u32 / self.size_px[0]]
     }
 
-    /// A channel of the frame by the oracle.
-    pub(super) fn oracle(&self, channel: Channel) -> PlaneOracle<'_> {
-        PlaneOracle::new(&self.view, self.number, channel)
+    /// A channel of the frame by the reference.
+    pub(super) fn reference(&self, channel: Channel) -> PlaneReference<'_> {
+        PlaneReference::new(&self.view, self.number, channel)
     }
 
     fn errors(&self, Plane { channel, values }: &Plane, tolerance: f64) -> Option<PlaneErrors> {
@@ -130,9 +140,9 @@ impl<'a> Compared<'a> {
             };
             std::array::from_fn(|k| if k < components { part(k) } else { 0.0 })
         };
-        let oracle = self.oracle(channel);
+        let reference = self.reference(channel);
         let error = |i: usize, offset: DVec2, sample: &RaySample| {
-            let wanted = oracle.value(self.pixel(i), offset, sample);
+            let wanted = reference.value(self.pixel(i), offset, sample);
             error(channel.facts().check, value(i), wanted, sample.hit.is_some())
         };
         // Whether a surface near a pixel's centre has the value.
@@ -177,7 +187,7 @@ impl<'a> Compared<'a> {
 
     /// Object that a pixel's centre sees; `None` without a ray.
     pub(super) fn object(&self, i: usize) -> Option<u32> {
-        let scene = &self.view.oracle.sequence.scene;
+        let scene = &self.view.reference.sequence.scene;
         let of_hit =
             |sample: &RaySample| sample.hit.as_ref().map_or(0, |hit| scene.object_of_surface(hit.surface));
         self.samples[i].as_ref().map(of_hit)

@@ -1,10 +1,10 @@
-//! Truth planes of the oracle: what the ray of each pixel's centre meets at mid-exposure.
+//! Truth planes of the reference: what the ray of each pixel's centre meets at mid-exposure.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    FrameView, Hit, Oracle, RaySample, RenderOptions,
+    FrameView, Hit, RaySample, ReferenceRenderer, RenderOptions,
     flow::FlowPicture,
     render::{EVEN_3D, shifts},
 };
@@ -19,15 +19,15 @@ const COVERAGE_RAYS: u32 = 256;
 /// Values of a channel at a pixel: its components, or a number, and 0 in what is left.
 pub(super) type Value = [f64; 4];
 
-/// A channel of a frame by the oracle's rays.
-pub(super) struct PlaneOracle<'a> {
+/// A channel of a frame by the reference's rays.
+pub(super) struct PlaneReference<'a> {
     channel: Channel,
     view: &'a FrameView<'a>,
     /// The picture that a flow leads to.
     picture: Option<FlowPicture<'a>>,
 }
 
-impl Oracle {
+impl ReferenceRenderer {
     /// Planes of the channels that rays give.
     pub(super) fn planes(&self, frame: u64, options: &RenderOptions) -> Vec<Plane> {
         let mut channels: Vec<Channel> = Vec::new();
@@ -50,9 +50,9 @@ impl Oracle {
             .map(|i| is_wanted(i).then(|| view.sample(pixel(i), DVec2::ZERO, 0.0)).flatten())
             .collect();
         let plane = |&channel: &Channel| {
-            let oracle = PlaneOracle::new(&view, frame, channel);
+            let reference = PlaneReference::new(&view, frame, channel);
             let value = |(i, sample): (usize, &Option<RaySample>)| {
-                sample.as_ref().map_or([0.0; 4], |seen| oracle.value(pixel(i), DVec2::ZERO, seen))
+                sample.as_ref().map_or([0.0; 4], |seen| reference.value(pixel(i), DVec2::ZERO, seen))
             };
             let values = samples.par_iter().enumerate().map(value);
             let values = match channel.kind() {
@@ -69,15 +69,15 @@ impl Oracle {
     }
 }
 
-impl<'a> PlaneOracle<'a> {
+impl<'a> PlaneReference<'a> {
     pub(super) fn new(view: &'a FrameView<'a>, frame: u64, channel: Channel) -> Self {
-        let oracle = view.oracle;
-        let output = &oracle.sequence.scenario.output;
+        let reference = view.reference;
+        let output = &reference.sequence.scenario.output;
         let step = i64::from(output.flow_step);
         let picture = match channel {
-            Channel::Flow => Some(oracle.flow_frame(frame as i64 + step)),
-            Channel::FlowBack => Some(oracle.flow_frame(frame as i64 - step)),
-            Channel::FlowGlobal => Some(oracle.flow_global(frame, output.flow_instant)),
+            Channel::Flow => Some(reference.flow_frame(frame as i64 + step)),
+            Channel::FlowBack => Some(reference.flow_frame(frame as i64 - step)),
+            Channel::FlowGlobal => Some(reference.flow_global(frame, output.flow_instant)),
             _ => None,
         };
         Self { channel, view, picture }
@@ -85,7 +85,7 @@ impl<'a> PlaneOracle<'a> {
 
     /// What a ray through a pixel, `offset` from its centre, sees.
     pub(super) fn value(&self, pixel: [u32; 2], offset: DVec2, seen: &RaySample) -> Value {
-        let scene = &self.view.oracle.sequence.scene;
+        let scene = &self.view.reference.sequence.scene;
         let from_px = DVec2::from_array(pixel.map(f64::from)) + offset;
         let one = |value: f64| [value, 0.0, 0.0, 0.0];
         let hit = seen.hit.as_ref();
@@ -132,8 +132,9 @@ impl FrameView<'_> {
 
     /// As [`Self::coverage`], and the fraction of rays that meet none of the objects in `known`.
     pub(super) fn coverage_of(&self, [x, y]: [u32; 2], centre: &RaySample, known: &[u32]) -> (f64, f64) {
-        let object =
-            |hit: Option<Hit>| hit.map_or(0, |hit| self.oracle.sequence.scene.object_of_surface(hit.surface));
+        let object = |hit: Option<Hit>| {
+            hit.map_or(0, |hit| self.reference.sequence.scene.object_of_surface(hit.surface))
+        };
         let wanted = object(centre.hit);
         let shift = shifts(u64::from(y) << 32 | u64::from(x));
         let (mut same, mut unknown, mut all) = (0_u32, 0_u32, 0_u32);

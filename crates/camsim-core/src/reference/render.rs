@@ -4,7 +4,7 @@
 use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{FrameView, Oracle, RaySample, lamps::RowLamps};
+use super::{FrameView, RaySample, ReferenceRenderer, lamps::RowLamps};
 use crate::{
     frame::{COORDS_CHANNELS, Plane, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
@@ -24,7 +24,7 @@ const BATCH: u32 = 8;
 /// Batches between two checks of the estimate.
 const BATCHES_A_CHECK: u32 = 4;
 
-/// Channels of a frame of the oracle, and the accuracy to which it is refined.
+/// Channels of a frame of the reference, and the accuracy to which it is refined.
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
     /// Channels of the frame. [`Channel::Depth`] and [`Channel::Coords`] cost one ray per pixel, the planes
@@ -43,7 +43,7 @@ pub struct RenderOptions {
     /// Ideal frame to which the source coordinates of [`Channel::Coords`] refer. Without one they are 0.
     pub key: Option<IdealView>,
     /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all. With
-    /// `[camera.point_spread]` the frame is not exposed then ([`Oracle::expose`]).
+    /// `[camera.point_spread]` the frame is not exposed then ([`ReferenceRenderer::expose`]).
     pub only: Option<Vec<bool>>,
 }
 
@@ -114,7 +114,7 @@ struct RenderedRow {
 
 /// Data that all rows of a frame share.
 struct FrameJob<'a> {
-    oracle: &'a Oracle,
+    reference: &'a ReferenceRenderer,
     view: FrameView<'a>,
     /// Number of the frame whose noise it has.
     picture: u32,
@@ -124,14 +124,14 @@ struct FrameJob<'a> {
     truth: bool,
 }
 
-impl Oracle {
+impl ReferenceRenderer {
     /// Renders one frame on all threads. The result does not depend on their number.
     #[must_use]
     pub fn render(&self, frame: u64, options: &RenderOptions) -> RenderedFrame {
         self.render_reported(frame, options).0
     }
 
-    /// As [`Oracle::render`], with a report of the convergence.
+    /// As [`ReferenceRenderer::render`], with a report of the convergence.
     #[must_use]
     pub fn render_reported(&self, frame: u64, options: &RenderOptions) -> (RenderedFrame, Convergence) {
         let size_px = self.sequence.scenario.camera.size_px;
@@ -139,7 +139,7 @@ impl Oracle {
             [Channel::Depth, Channel::Coords].map(|channel| options.channels.contains(&channel));
         let exposure = self.sequence.exposure(frame);
         let job = FrameJob {
-            oracle: self,
+            reference: self,
             photometry: Photometry::before_point_spread(&self.sequence.scenario.camera, exposure.as_ref()),
             view: self.view(frame),
             picture: self.sequence.picture(frame) as u32,
@@ -179,7 +179,7 @@ impl Oracle {
         (rendered, convergence)
     }
 
-    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`Oracle::render`]
+    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`ReferenceRenderer::render`]
     /// does at its end. With `[camera.point_spread]` it leaves that out for a part of the pixels, as light
     /// comes from all.
     pub fn expose(&self, frame: &mut RenderedFrame) {
@@ -285,7 +285,7 @@ impl FrameJob<'_> {
                 // At the border of the lens's field, the mean is over the part of the pixel that has rays.
                 let at = |uv: DVec2, instants: &mut SamplePoses<'_>| {
                     let (t_s, pose) = instants.pose(x, i);
-                    self.oracle.radiance_at(t_s, &pose, uv)
+                    self.reference.radiance_at(t_s, &pose, uv)
                 };
                 if let Some(others) = visible.red_and_blue {
                     let rays = self.view.ray_of_red_and_blue([x, y], position - 0.5).unwrap_or_default();
@@ -325,7 +325,7 @@ impl FrameJob<'_> {
         if !self.options.photometric {
             return color;
         }
-        let sequence = &self.oracle.sequence;
+        let sequence = &self.reference.sequence;
         let camera = &sequence.scenario.camera;
         let is_part = camera.face.is_some() || camera.primary.is_some();
         // Parts of a camera give light where the stage takes all of them at once.
@@ -334,7 +334,7 @@ impl FrameJob<'_> {
         }
         let spec = &camera.photometric;
         // An image sensor collects the light of its rows itself.
-        let gain = match self.oracle.sensor_collects() {
+        let gain = match self.reference.sensor_collects() {
             true => 1.0,
             false => self.view.light_gain(pixel),
         };
@@ -362,7 +362,7 @@ impl FrameJob<'_> {
 
     /// Weights of red, green and blue by the model of the light's fall.
     fn vignetting(&self, spec: &VignettingSpec, pixel: [u32; 2]) -> DVec3 {
-        let camera = &self.oracle.sequence.scenario.camera;
+        let camera = &self.reference.sequence.scenario.camera;
         let [width, height] = camera.size_px.map(f64::from);
         let axis =
             DVec2::from(camera.principal_point_px.unwrap_or([0.5 * (width - 1.0), 0.5 * (height - 1.0)]));
@@ -383,7 +383,7 @@ impl FrameJob<'_> {
 
     fn coords(&self, pixel: [u32; 2], sample: &RaySample) -> [f32; COORDS_CHANNELS] {
         let source_px = self.options.key.map_or(DVec2::ZERO, |key| key.source_px(sample));
-        let dt_s = self.oracle.timing.dt_s(pixel);
+        let dt_s = self.reference.timing.dt_s(pixel);
         // A sample of the sky has no point; its direction is stored.
         let point =
             sample.hit.map_or_else(|| sky_direction_ned(&sample.pose, sample.uv), |hit| hit.point_ned_m);
@@ -437,7 +437,7 @@ struct SamplePoses<'a> {
 impl<'a> SamplePoses<'a> {
     fn new(job: &'a FrameJob<'a>, y: u32) -> Self {
         let is_exposed = job.view.exposure_s([0, y]) > 0.0;
-        let shared = job.oracle.timing.reads_rows().then(Vec::new);
+        let shared = job.reference.timing.reads_rows().then(Vec::new);
         Self { job, y, is_exposed, shift: shifts(u64::from(y))[2], shared }
     }
 
@@ -447,7 +447,7 @@ impl<'a> SamplePoses<'a> {
             let phase = if self.is_exposed { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
             let exposure_s = self.job.view.exposure_s([x, self.y]);
             let t_s = self.job.view.mid_s([x, self.y]) + phase * exposure_s;
-            (t_s, self.job.oracle.sequence.path.pose(t_s))
+            (t_s, self.job.reference.sequence.path.pose(t_s))
         };
         let Some(shared) = &mut self.shared else { return pose(i, self.shift) };
         let i = if self.is_exposed { i } else { 0 };

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::{Hit, Oracle, Ray, limit_of};
+use super::{Hit, Ray, ReferenceRenderer, limit_of};
 
-impl Oracle {
+impl ReferenceRenderer {
     /// Whether the scene has blended surfaces.
     pub(crate) fn has_blended(&self) -> bool {
         self.blends

@@ -1,11 +1,11 @@
 //! Shadows: a ray from a hit to the sun, through everything where it is at the ray's own instant.
 
-use super::{Hit, Oracle, ray::Ray};
+use super::{Hit, ReferenceRenderer, ray::Ray};
 
 /// How far above its surface a ray to the sun begins, metres: more than rounding, less than anything shows.
 const LIFT_M: f64 = 1e-6;
 
-impl Oracle {
+impl ReferenceRenderer {
     /// A hit with the light that it has at path time `t_s`: without the sun where that is hidden.
     pub(super) fn in_light(&self, t_s: f64, hit: Hit) -> Hit {
         if hit.sky_fraction < 1.0 && self.is_in_shadow(t_s, &hit) {

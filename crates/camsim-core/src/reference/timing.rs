@@ -1,4 +1,4 @@
-//! Times of the oracle: frame stamps, and the mid-exposure of each pixel.
+//! Times of the reference: frame stamps, and the mid-exposure of each pixel.
 
 use crate::{
     scenario::{CameraSpec, FieldOr, FlowInstant, Parity, Readout, Reset},

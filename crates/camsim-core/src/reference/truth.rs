@@ -1,10 +1,10 @@
-//! Errors of a frame's depths and points against the oracle, pixel by pixel, silhouettes included.
+//! Errors of a frame's depths and points against the reference, pixel by pixel, silhouettes included.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{FrameView, Oracle, RaySample};
+use super::{FrameView, RaySample, ReferenceRenderer};
 use crate::frame::RenderedFrame;
 
 /// Fraction of the depth beyond which a depth or a point is wrong.
@@ -14,7 +14,7 @@ const DIRECTIONS: u32 = 16;
 /// Distances of those samples, as fractions of the largest.
 const RINGS: [f64; 3] = [0.3, 0.65, 1.0];
 
-/// Errors of a frame's depths and points against the oracle, relative to the depth.
+/// Errors of a frame's depths and points against the reference, relative to the depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TruthErrors {
     /// Pixels that are valid in both.
@@ -59,7 +59,7 @@ struct PixelError {
 /// from that of the sequence.
 #[must_use]
 pub fn truth_errors(
-    oracle: &Oracle,
+    reference: &ReferenceRenderer,
     number: u64,
     frame: &RenderedFrame,
     near_px: f64,
@@ -67,13 +67,13 @@ pub fn truth_errors(
     let (depth_m, color_rgba, coords) = (frame.depth_m()?, frame.color_rgba(), frame.coords());
     let width = frame.size_px[0];
     let pixels = width as usize * frame.size_px[1] as usize;
-    if frame.size_px != oracle.sequence.scenario.camera.size_px
+    if frame.size_px != reference.sequence.scenario.camera.size_px
         || depth_m.len() != pixels
         || color_rgba.len() != 4 * pixels
     {
         return None;
     }
-    let view = oracle.view(number);
+    let view = reference.view(number);
     let error_of = |i: usize| {
         let pixel = [i as u32 % width, i as u32 / width];
         let sample = view.sample(pixel, DVec2::ZERO, 0.0).filter(|_| color_rgba[4 * i + 3] > 0.0)?;

@@ -23,7 +23,7 @@ struct ProximityNode {
 }
 
 impl ProximityBvh {
-    /// Builds the tree over `boxes`, whose indices identify the items. Empty boxes are left out.
+    /// Builds the tree over `boxes`, whose indices identify the items. Empty boxes are skipped.
     pub fn new(boxes: &[Aabb]) -> Self {
         let mut tree = Self {
             nodes: Vec::new(),

@@ -32,7 +32,7 @@ struct RayBvhNode {
 }
 
 impl RayBvh {
-    /// Builds the tree over `boxes`, whose indices identify the items. Empty boxes are left out.
+    /// Builds the tree over `boxes`, whose indices identify the items. Empty boxes are skipped.
     pub fn new(boxes: &[Aabb]) -> Self {
         let mut items: Vec<u32> =
             (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect();

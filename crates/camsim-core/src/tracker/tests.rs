@@ -9,7 +9,7 @@ use crate::scenario::Auto;
 fn lawnmower() -> Option<Vec<LogRow>> {
     const CORRUPTED: [usize; 6] = [7190, 22762, 23060, 37732, 44551, 44849];
     let Some(data) = std::env::var_os("CAMSIM_DATA") else {
-        eprintln!("CAMSIM_DATA is not set: real flight left out");
+        eprintln!("CAMSIM_DATA is not set: real flight skipped");
         return None;
     };
     let text =

@@ -168,7 +168,7 @@ fn each_value_out_of_range_is_named_once() {
         }),
         ("quality.solver", |s| {
             s.quality.preset = Preset::Paper;
-            s.quality.solver = Auto::Value(Solver::Oracle);
+            s.quality.solver = Auto::Value(Solver::Reference);
         }),
         ("quality.iterations", |s| {
             s.quality.preset = Preset::Paper;

@@ -55,7 +55,7 @@ fn check_keys(check: &mut Check, i: usize, twin: &TwinSpec) {
     for (name, _) in flags.iter().filter(|(_, flag)| twin.ideal && *flag == Some(true)) {
         check.fail(
             key(name),
-            "is left out by ideal = true; write false, or what is to be left out instead of ideal",
+            "is already omitted by ideal = true; write false, or what is to be omitted instead of ideal",
         );
     }
     check.require(twin.exposure != Some(true) || twin.instants.is_none(), key("exposure"), || {

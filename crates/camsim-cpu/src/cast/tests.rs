@@ -5,7 +5,7 @@
 
 use camsim_core::{
     pose::CameraPose,
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scene::{Encoding, Material, Mesh, PrefilterTaps, Texture, Wrap},
     sequence::Sequence,
     temporal::{
@@ -51,10 +51,10 @@ fn the_paper_stores_bytes_of_srgb_without_fog() {
     let mut scene = gallery();
     scene.fog_visibility_m = None;
     let (without, _) = planned(scene);
-    let oracle = Oracle::new(without).unwrap();
+    let reference = ReferenceRenderer::new(without).unwrap();
     let mut most = 0.0_f64;
     for (i, position_px) in pixels() {
-        let light = oracle.radiance(&key.pose, ray_uv(&plan, position_px));
+        let light = reference.radiance(&key.pose, ray_uv(&plan, position_px));
         most = most.max((color_at(&clear, i) - light).abs().max_element());
         let bytes = 255.0 * color_at(&paper, i);
         assert!((bytes - bytes.round()).abs().max_element() < 1e-4, "{bytes}");
@@ -117,7 +117,7 @@ fn minified_textures_are_means_over_the_pixels_area() {
     const SIDE: u32 = 24;
     let (scene, key) = fine_ground();
     let (sequence, mut plan) = planned(scene);
-    let oracle = Oracle::new(sequence.clone()).unwrap();
+    let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
     let cast = CastScene::new(&sequence.scene);
     let reads = [PrefilterTaps::One, PrefilterTaps::Two, PrefilterTaps::Four, PrefilterTaps::Grid];
     let images = reads.map(|reads| {
@@ -126,7 +126,7 @@ fn minified_textures_are_means_over_the_pixels_area() {
     });
     let ([mut errors, mut biases], mut unfiltered, mut count) = ([[0.0; 4]; 2], 0.0, 0.0);
     for (i, position_px) in pixels().filter(|(i, _)| i % 11 == 0) {
-        let light = |offset_px: DVec2| oracle.radiance(&key.pose, ray_uv(&plan, position_px + offset_px));
+        let light = |offset_px: DVec2| reference.radiance(&key.pose, ray_uv(&plan, position_px + offset_px));
         let position = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
         let positions = (0..SIDE * SIDE).map(|k| DVec2::new(position(k % SIDE), position(k / SIDE)));
         let mean = positions.map(light).sum::<DVec3>() / f64::from(SIDE * SIDE);
@@ -167,12 +167,12 @@ fn minified_panes_are_means_of_colors_weighted_by_alpha() {
     ];
     let (sequence, mut plan) = planned(Scene { meshes, fog_visibility_m: Some(300.0), ..Scene::default() });
     plan.surface_reads = PrefilterTaps::Grid;
-    let oracle = Oracle::new(sequence.clone()).unwrap();
+    let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
     let key = key(DVec3::ZERO, 0.0, 0.0);
     let image = CastScene::new(&sequence.scene).draw(&plan, &key);
     let (mut error, mut bias, mut unfiltered, mut count) = (0.0, DVec3::ZERO, 0.0, 0.0);
     for (i, position_px) in pixels().filter(|(i, _)| i % 7 == 0) {
-        let light = |offset_px: DVec2| oracle.radiance(&key.pose, ray_uv(&plan, position_px + offset_px));
+        let light = |offset_px: DVec2| reference.radiance(&key.pose, ray_uv(&plan, position_px + offset_px));
         let position = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
         let positions = (0..SIDE * SIDE).map(|k| DVec2::new(position(k % SIDE), position(k / SIDE)));
         let mean = positions.map(light).sum::<DVec3>() / f64::from(SIDE * SIDE);
@@ -190,7 +190,7 @@ fn minified_panes_are_means_of_colors_weighted_by_alpha() {
 #[test]
 fn samples_have_the_depths_and_colors_of_the_reference() {
     let (sequence, mut plan) = planned(gallery());
-    let oracle = Oracle::new(sequence.clone()).unwrap();
+    let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
     let cast = CastScene::new(&sequence.scene);
     let key = key(DVec3::new(0.0, 0.0, -12.0), 0.0, 0.05);
     for scale in [1, 2] {
@@ -203,11 +203,11 @@ fn samples_have_the_depths_and_colors_of_the_reference() {
             for k in 0..SAMPLES {
                 let position_px = (corner + SupersampledImage::SAMPLE_POSITIONS[k]) / f64::from(scale) - 0.5;
                 let uv = ray_uv(&plan, position_px);
-                let hit = oracle.cast(key.pose.position_ned_m, key.pose.ned_from_camera * uv.extend(1.0));
+                let hit = reference.cast(key.pose.position_ned_m, key.pose.ned_from_camera * uv.extend(1.0));
                 let depth = hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
                 assert!((f64::from(depths[k]) - depth).abs() <= 1e-6 * depth, "{position_px}");
                 let color = DVec3::from_array(colors[k].map(|half| half.to_f64()));
-                let error = (color - oracle.radiance(&key.pose, uv)).abs().max_element();
+                let error = (color - reference.radiance(&key.pose, uv)).abs().max_element();
                 // Triangles are shaded once a pixel.
                 apart += u32::from(error > 0.06);
                 sum += error * error;

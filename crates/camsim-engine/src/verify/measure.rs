@@ -4,8 +4,8 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     reference::{
-        CoordErrors, Disocclusion, ImageErrors, Oracle, RenderOptions, coord_errors, coverage_errors,
-        disocclusion, flow_errors, image_errors, plane_errors, silhouettes, truth_errors,
+        CoordErrors, Disocclusion, ImageErrors, ReferenceRenderer, RenderOptions, coord_errors,
+        coverage_errors, disocclusion, flow_errors, image_errors, plane_errors, silhouettes, truth_errors,
     },
     scenario::{Channel, Face},
     sequence::Sequence,
@@ -32,7 +32,7 @@ const COVERAGE_PIXELS: usize = 4_000;
 #[derive(Debug)]
 pub(super) struct Measuring<'e> {
     session: Session<'e>,
-    oracle: Oracle,
+    reference: ReferenceRenderer,
     with_pictures: bool,
 }
 
@@ -42,15 +42,15 @@ impl<'e> Measuring<'e> {
         sequence: &Arc<Sequence>,
         with_pictures: bool,
     ) -> Result<Self, VerifyError> {
-        let oracle = Oracle::new(sequence.clone())?;
+        let reference = ReferenceRenderer::new(sequence.clone())?;
         let mut session = engine.session::<Infallible>(sequence.clone(), &MEASURED)?;
         session.set_looked_up_coords(true);
-        Ok(Self { session, oracle, with_pictures })
+        Ok(Self { session, reference, with_pictures })
     }
 
     /// The face that it is.
     pub fn face(&self) -> Option<&'static str> {
-        self.oracle.sequence().scenario.camera.face.map(Face::name)
+        self.reference.sequence().scenario.camera.face.map(Face::name)
     }
 
     /// Measures a frame, and tells what is measured next.
@@ -61,13 +61,13 @@ impl<'e> Measuring<'e> {
     ) -> Result<FrameReport, E> {
         on(Progress::Step(&format!("frame {frame}")))?;
         let first = self.render(frame, 0.0)?;
-        let mut errors = coords(&self.oracle, &first, 0.0)?;
+        let mut errors = coords(&self.reference, &first, 0.0)?;
         let phases = phases(&first.plan);
         for (i, &phase) in phases.iter().enumerate() {
             let (instant, all) = (i + 2, phases.len() + 1);
             on(Progress::Step(&format!("frame {frame}, instant {instant} of {all}")))?;
             let done = self.render(frame, phase)?;
-            let candidate = coords(&self.oracle, &done, f64::from(phase))?;
+            let candidate = coords(&self.reference, &done, f64::from(phase))?;
             if candidate.verdict().p99_px() > errors.verdict().p99_px() {
                 errors = candidate;
             }
@@ -87,7 +87,7 @@ impl<'e> Measuring<'e> {
         errors: &CoordErrors,
         picture: Option<PictureReport>,
     ) -> Result<FrameReport, VerifyError> {
-        let (oracle, frame, near_px) = (&self.oracle, first.plan.frame, self.tolerance_px());
+        let (reference, frame, near_px) = (&self.reference, first.plan.frame, self.tolerance_px());
         let verdict = errors.verdict();
         let measured = Measured {
             smooth: errors.smooth,
@@ -96,12 +96,12 @@ impl<'e> Measuring<'e> {
             judged_by: verdict.into(),
             falsely_valid: errors.falsely_valid,
             missing: errors.missing,
-            disocclusion_fraction: disocclusion_of(oracle, &first.plan).fraction(),
+            disocclusion_fraction: disocclusion_of(reference, &first.plan).fraction(),
         };
-        let truth = truth_errors(oracle, frame, &first.frame, near_px)
+        let truth = truth_errors(reference, frame, &first.frame, near_px)
             .filter(|_| first.plan.has_exact_truth())
             .map(|errors| Kept { kept: errors.is_consistent(), errors });
-        let level_of_detail = LevelOfDetail::of(&first.plan, oracle.sequence());
+        let level_of_detail = LevelOfDetail::of(&first.plan, reference.sequence());
         let report = FrameReport {
             frame,
             face: self.face(),
@@ -132,21 +132,21 @@ impl<'e> Measuring<'e> {
         self.session.renew::<Infallible>(sequence.clone(), &[&MEASURED[..], &asked].concat())?;
         let done = self.render(report.frame, 0.0)?;
         self.session.renew::<Infallible>(sequence, &MEASURED)?;
-        let (oracle, number, near_px) = (&self.oracle, done.plan.frame, self.tolerance_px());
-        let planes = plane_errors(oracle, number, &done.frame, near_px);
-        let flows = flow_errors(oracle, number, &done.frame, near_px, FLOW_PIXELS);
+        let (reference, number, near_px) = (&self.reference, done.plan.frame, self.tolerance_px());
+        let planes = plane_errors(reference, number, &done.frame, near_px);
+        let flows = flow_errors(reference, number, &done.frame, near_px, FLOW_PIXELS);
         report.planes = planes.into_iter().map(PlaneReport::from).collect();
         report.flows = flows
             .into_iter()
             .map(|errors| FlowReport { channel: errors.channel, kept: errors.faults == 0, errors })
             .collect();
-        report.coverage = coverage_errors(oracle, number, &done.frame, COVERAGE_PIXELS)
+        report.coverage = coverage_errors(reference, number, &done.frame, COVERAGE_PIXELS)
             .map(|errors| Kept { kept: errors.faults == 0, errors });
         Ok(report)
     }
 
     fn tolerance_px(&self) -> f64 {
-        self.oracle.sequence().scenario.quality.max_error_px
+        self.reference.sequence().scenario.quality.max_error_px
     }
 
     /// Renders a frame with the source coordinates of an instant of its exposure.
@@ -161,10 +161,10 @@ impl<'e> Measuring<'e> {
     }
 
     fn picture(&self, done: &Finished) -> PictureReport {
-        let (oracle, frame) = (&self.oracle, done.plan.frame);
+        let (reference, frame) = (&self.reference, done.plan.frame);
         let options = RenderOptions { key: Some(done.plan.ideal_view()), ..RenderOptions::default() };
-        let truth = oracle.render(frame, &options);
-        let near = silhouettes(oracle, frame, &[-0.5, 0.0, 0.5]);
+        let truth = reference.render(frame, &options);
+        let near = silhouettes(reference, frame, &[-0.5, 0.0, 0.5]);
         let errors = image_errors(&truth, &done.frame, &near);
         let figure = |of: fn(&ImageErrors) -> f64| errors.as_ref().map_or(f64::NAN, of);
         let finite = |db: f64| db.is_finite().then_some(db);
@@ -172,7 +172,7 @@ impl<'e> Measuring<'e> {
         PictureReport {
             rms_dn,
             predicted_dn: done.plan.predicted.picture_dn(),
-            kept: rms_dn <= oracle.sequence().scenario.quality.max_error_dn,
+            kept: rms_dn <= reference.sequence().scenario.quality.max_error_dn,
             psnr_db: finite(figure(|errors| errors.all_db)),
             smooth_psnr_db: finite(figure(|errors| errors.smooth_db)),
             silhouettes_psnr_db: finite(figure(|errors| errors.silhouettes_db)),
@@ -181,8 +181,8 @@ impl<'e> Measuring<'e> {
     }
 }
 
-fn coords(oracle: &Oracle, done: &Finished, phase: f64) -> Result<CoordErrors, VerifyError> {
-    coord_errors(oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1)
+fn coords(reference: &ReferenceRenderer, done: &Finished, phase: f64) -> Result<CoordErrors, VerifyError> {
+    coord_errors(reference, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1)
         .ok_or(VerifyError::NoCoords(done.plan.frame))
 }
 
@@ -198,9 +198,9 @@ fn phases(plan: &FramePlan) -> Vec<f32> {
 }
 
 /// Disocclusion of a frame, at mid-exposure and, with motion blur, at both ends, like the planner's probes.
-fn disocclusion_of(oracle: &Oracle, plan: &FramePlan) -> Disocclusion {
+fn disocclusion_of(reference: &ReferenceRenderer, plan: &FramePlan) -> Disocclusion {
     let phases: &[f64] = if plan.blur.is_some() { &[-0.5, 0.0, 0.5] } else { &[0.0] };
-    disocclusion(oracle, plan.frame, &plan.key_poses(), phases)
+    disocclusion(reference, plan.frame, &plan.key_poses(), phases)
 }
 
 /// Converts a PSNR to an RMS error in DN.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::Channel,
     scene::{Encoding, Light, Mesh, Scene, Terrain, Texture},
     sequence::Sequence,
@@ -59,12 +59,12 @@ fn evening() -> Light {
 }
 
 /// Pixels within 3 px of a shadow's border, row-major: where rays through pixels beside each other differ.
-fn near_borders(oracle: &Oracle) -> Vec<bool> {
-    let [width, height] = oracle.sequence().scenario.camera.size_px;
-    let view = oracle.view(0);
+fn near_borders(reference: &ReferenceRenderer) -> Vec<bool> {
+    let [width, height] = reference.sequence().scenario.camera.size_px;
+    let view = reference.view(0);
     let is_dark = |x: u32, y: u32| {
         let sample = view.sample([x, y], DVec2::ZERO, 0.0)?;
-        Some(oracle.is_in_shadow(sample.t_s, &sample.hit?))
+        Some(reference.is_in_shadow(sample.t_s, &sample.hit?))
     };
     let dark: Vec<Option<bool>> = (0..width * height).map(|i| is_dark(i % width, i / width)).collect();
     let at = |x: u32, y: u32| dark[(y * width + x) as usize];
@@ -85,8 +85,8 @@ fn near_borders(oracle: &Oracle) -> Vec<bool> {
 
 fn expect_hills(who: &str, engine: &Engine, scene: Scene) {
     let sequence = over_hills(scene);
-    let oracle = Oracle::new(sequence.clone()).expect("an oracle");
-    let near = near_borders(&oracle);
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
+    let near = near_borders(&reference);
     let truth = reference(&sequence);
     let done = render(engine, &sequence, &[Channel::Color], 0);
     let [borders_db, others_db] = psnr_db(&truth, done.frame.color_rgba(), &near);

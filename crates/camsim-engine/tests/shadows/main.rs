@@ -10,7 +10,7 @@ mod sundial;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, MountSpec, Scenario},
     scene::{Encoding, Light, Terrain, Texture},
     sequence::Sequence,
@@ -48,7 +48,7 @@ fn looking_down(size_px: [u32; 2], focal_px: f64) -> Scenario {
 fn reference(sequence: &Arc<Sequence>) -> Vec<f32> {
     let options =
         RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.2, ..RenderOptions::default() };
-    Oracle::new(sequence.clone()).expect("an oracle").render(0, &options).into_color()
+    ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options).into_color()
 }
 
 /// PSNR of the pixels near borders, and of the others, dB.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Hit, Oracle},
+    reference::{Hit, ReferenceRenderer},
     scenario::Channel,
     scene::Scene,
     sequence::Sequence,
@@ -83,11 +83,11 @@ fn area_within(outline: &[DVec2], low: DVec2, high: DVec2) -> f64 {
 
 #[test]
 fn reference_has_the_sundials_shadow_where_trigonometry_says() {
-    let oracle = Oracle::new(sundial()).expect("an oracle");
+    let reference = ReferenceRenderer::new(sundial()).expect("a reference");
     let outline = shadow_outline();
     let ground = |point: DVec2| -> Hit {
         let origin = point.extend(-1e-3);
-        let hit = oracle.cast(origin, DVec3::Z).expect("ground");
+        let hit = reference.cast(origin, DVec3::Z).expect("ground");
         assert_eq!(hit.surface, 0);
         hit
     };
@@ -104,7 +104,7 @@ fn reference_has_the_sundials_shadow_where_trigonometry_says() {
                     continue;
                 }
                 let expected = within_m(&outline, point) > 0.0;
-                assert_eq!(oracle.is_in_shadow(0.0, &ground(point)), expected, "{point}");
+                assert_eq!(reference.is_in_shadow(0.0, &ground(point)), expected, "{point}");
                 (shaded, lit) = (shaded + u32::from(expected), lit + u32::from(!expected));
             }
         }
@@ -116,7 +116,7 @@ fn reference_has_the_sundials_shadow_where_trigonometry_says() {
     let corner = DVec2::splat(HALF_M);
     let found = [-1e-5, 1e-5].map(|off_m| {
         let inside = corner + (tip_m + off_m) * along - 1e-9;
-        oracle.is_in_shadow(0.0, &ground(inside))
+        reference.is_in_shadow(0.0, &ground(inside))
     });
     assert_eq!(found, [true, false]);
 }

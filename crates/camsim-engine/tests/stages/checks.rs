@@ -55,7 +55,7 @@ impl Group {
         }
     }
 
-    /// Whether pixels near the sky are left out.
+    /// Whether pixels near the sky are skipped.
     pub fn is_clear_of_sky(self) -> bool {
         self == Self::Smooth
     }
@@ -413,7 +413,7 @@ pub static CHECKS: &[Check] = &[
 /// What an implementation does not expose, and why; [`super::compare::run`] adds what a single case finds.
 pub static UNEXPOSED: &[(&str, &str, &str)] = &[
     ("plans that no planner makes", "gpu", "a session renders plans of the planner only"),
-    ("row records (rows.csv)", "every implementation", "the planner makes them; see `oracle_rows.rs`"),
+    ("row records (rows.csv)", "every implementation", "the planner makes them; see `reference_rows.rs`"),
     ("silhouette rays", "every implementation", "compared in `silhouettes.rs` and `keys.rs`"),
     (
         "depth of constant twist",

@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use camsim_core::reference::Oracle;
+use camsim_core::reference::ReferenceRenderer;
 use camsim_plan::FramePlan;
 
 use super::{
@@ -67,12 +67,13 @@ fn compare(group: Group, case: &Case, engines: &Engines, software: usize, table:
     });
     let output = |implementation: Implementation| outputs[implementation as usize].1.as_ref().ok();
     assert_alike(case, output(Implementation::CpuVectorised), output(Implementation::Gpu));
-    let oracle = OnceCell::new();
+    let reference = OnceCell::new();
     let twin_of = |output: &CaseOutput| match case.output {
         Output::Ideal => Compared::Ideal(ideal_twin(case, &output.plan, &output.images)),
         Output::Frame | Output::FrameAndColorAlone => {
-            let oracle = oracle.get_or_init(|| Oracle::new(case.sequence.clone()).expect("a usable camera"));
-            Compared::Frame(Twin::new(case, &output.plan, &output.images, oracle).frame(&output.frame))
+            let reference = reference
+                .get_or_init(|| ReferenceRenderer::new(case.sequence.clone()).expect("a usable camera"));
+            Compared::Frame(Twin::new(case, &output.plan, &output.images, reference).frame(&output.frame))
         }
     };
     let twins: [OnceCell<Compared>; 3] = Default::default();

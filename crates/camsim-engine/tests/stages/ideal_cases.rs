@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use camsim_core::{
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{Auto, MountSpec, Scenario, Silhouettes},
     scene::{Encoding, Light, Mesh, MeshVertex, PrefilterTaps, Scene, Shape, Texture, Wrap},
     sequence::Sequence,
@@ -251,13 +251,13 @@ pub fn gallery() -> Vec<Case> {
 
 /// The pane of glass without a cutoff has depth all over; every surface is seen.
 fn assert_all_surfaces_are_seen(sequence: &Arc<Sequence>, plan: &FramePlan, keys: &[KeyFrame]) {
-    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+    let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
     let (mut surfaces, mut sky) = (vec![0; 1 + sequence.scene.meshes.len()], 0);
     let [width, height] = plan.ideal.size_px;
     for (key, i) in keys.iter().flat_map(|key| (0..width * height).map(move |i| (key, i))) {
         let position_px = DVec2::new((i % width).into(), (i / width).into());
         let uv = (position_px - plan.ideal.principal_px) / plan.ideal.focal_px;
-        match oracle.cast(key.pose.position_ned_m, key.pose.ned_from_camera * uv.extend(1.0)) {
+        match reference.cast(key.pose.position_ned_m, key.pose.ned_from_camera * uv.extend(1.0)) {
             Some(hit) => surfaces[hit.surface as usize] += 1,
             None => sky += 1,
         }

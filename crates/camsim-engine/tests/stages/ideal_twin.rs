@@ -1,6 +1,6 @@
 //! The ideal frame in closed form or by rays in f64.
 
-use camsim_core::reference::Oracle;
+use camsim_core::reference::ReferenceRenderer;
 use camsim_engine::IdealPlanes;
 use camsim_plan::FramePlan;
 use glam::{DVec2, DVec3};
@@ -42,10 +42,10 @@ pub fn ideal_twin(
     let values: Vec<(Option<f64>, Option<DVec3>)> = match case.ideal_twin {
         TwinSource::None => vec![(None, None); count],
         TwinSource::Rays => {
-            let oracle = Oracle::new(case.sequence.clone()).expect("a usable camera");
+            let reference = ReferenceRenderer::new(case.sequence.clone()).expect("a usable camera");
             let value = |i: usize| {
-                let hit = oracle.cast(pose.position_ned_m, ray(i, DVec2::ZERO));
-                let color_dn = 255.0 * oracle.radiance(pose, uv(i, DVec2::ZERO));
+                let hit = reference.cast(pose.position_ned_m, ray(i, DVec2::ZERO));
+                let color_dn = 255.0 * reference.radiance(pose, uv(i, DVec2::ZERO));
                 (Some(hit.map_or(0.0, |hit| 1.0 / hit.depth_m)), Some(color_dn))
             };
             (0..count).into_par_iter().map(value).collect()

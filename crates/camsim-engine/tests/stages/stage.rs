@@ -109,7 +109,7 @@ pub struct OtherSurface {
     pub depth: f64,
 }
 
-/// Differences of an output frame's pixels in a stage. With `clear_of_sky` pixels are left out that the
+/// Differences of an output frame's pixels in a stage. With `clear_of_sky` pixels are skipped that the
 /// reference has not or has near the sky.
 pub fn frame_differences(
     stage: Stage,

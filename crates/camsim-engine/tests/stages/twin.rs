@@ -3,7 +3,7 @@
 use camsim_core::{
     noise::tail_table,
     photometric::{Photometry, photometric},
-    reference::{FrameView, Oracle},
+    reference::{FrameView, ReferenceRenderer},
     shutter::RowAxis,
     temporal::{
         ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyDepth, PathStage,
@@ -66,7 +66,7 @@ impl<'a> Twin<'a> {
         case: &'a Case,
         plan: &'a FramePlan,
         (ideal, color_rgba, inverse_depth): &'a IdealPlanes,
-        oracle: &'a Oracle,
+        reference: &'a ReferenceRenderer,
     ) -> Self {
         assert_eq!(plan.keys.len(), 1, "{}: one ideal frame", case.name);
         let rest = (DMat3::IDENTITY, DVec3::ZERO);
@@ -92,8 +92,8 @@ impl<'a> Twin<'a> {
             lens_map: if plan.ray == RayStage::LensMap { plan.camera.lens_inverse() } else { Vec::new() },
             weights: case.sequence.vignette_weights().1,
             noise_table: tail_table(),
-            view: oracle.view(plan.frame),
-            stamp_s: oracle.stamp_s(plan.frame),
+            view: reference.view(plan.frame),
+            stamp_s: reference.stamp_s(plan.frame),
         }
     }
 

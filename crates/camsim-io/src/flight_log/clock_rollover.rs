@@ -124,7 +124,7 @@ fn leave_out_unset_clock(rows: &mut Vec<ParsedRow>, notes: &mut Vec<Note>) -> Re
     rows.retain(|row| row.time.is_none_or(|time| time >= first_set_ns));
     notes.push(Note::warning(format!(
         "{unset} rows have times {years:.0} years before the others, as of a clock that is not set yet, \
-                and are left out"
+                and are skipped"
     )));
     Ok(())
 }

@@ -232,14 +232,14 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
             receiver_index multi_id core ekf_core antenna antenna_id antenna_index",
         "number of the receiver or estimator; `I` or `C` of one ArduPilot message (with `TimeUS`)",
         "of several the one that ArduPilot's `U` says is in use, else the lowest; the rows of the others are \
-            left out and counted",
+            skipped and counted",
     ),
     known(
         Fix(FixCode::Dimensions),
         "fix_type fixtype gps_fix_type gps_fix gpsfix gnss_fix gnss_fix_type gps_lock fix fix_dimension \
             fix_mode",
         "fix: 0 and 1 none, 2 two-dimensional, from 3 on three-dimensional; or in words",
-        "rows without a three-dimensional fix are left out and counted",
+        "rows without a three-dimensional fix are skipped and counted",
     ),
     known(
         Fix(FixCode::NonZero),
@@ -247,25 +247,25 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
             position_valid pos_valid is_valid valid has_fix fix_ok gps_fix_ok gnss_fix_ok solution_valid \
             xy_valid healthy gps_healthy gnss_healthy gps_ok",
         "quality of the fix, or whether there is one; 0, false, V and words such as `none`: no fix",
-        "rows without a fix are left out and counted",
+        "rows without a fix are skipped and counted",
     ),
     known(
         Fix(FixCode::NonNegative),
         "status_status field_status_status navsat_status gps_status_status",
         "status of a fix, as ROS has it; below 0: no fix",
-        "rows without a fix are left out and counted",
+        "rows without a fix are skipped and counted",
     ),
     known(
         InUse,
         "used in_use is_used gps_used is_gps_used gnss_used primary is_primary",
         "whether the receiver of a row was in use",
-        "rows that were not are left out and counted, unless all are such",
+        "rows that were not are skipped and counted, unless all are such",
     ),
     known(
         Fix(FixCode::Rtklib),
         "q",
         "RTKLIB's quality of a solution; 0: none",
-        "rows without a solution are left out and counted, unless all are such or there are columns `p` or `r`",
+        "rows without a solution are skipped and counted, unless all are such or there are columns `p` or `r`",
     ),
     known(
         Fix(FixCode::Satellites),
@@ -273,13 +273,13 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
             numsats numsat numsv satellite_count sat_count gps_sats gps_num_sats gps_num_sat gps_satellites \
             gnss_satellites gps_num",
         "number of satellites; 0: no fix",
-        "rows without satellites are left out and counted, unless all are such",
+        "rows without satellites are skipped and counted, unless all are such",
     ),
     known(
         Fix(FixCode::Negated),
         "lost is_lost tracking_lost gps_lost outlier is_outlier rejected invalid",
         "flag of a position that is none",
-        "rows with the flag set are left out and counted, unless all are such",
+        "rows with the flag set are skipped and counted, unless all are such",
     ),
     known(
         Fix(FixCode::Words),
@@ -289,7 +289,7 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
             tracking_status tracker_state mode gps_mode pos_mode position_mode validity",
         "state of a fix or of a tracker in words (`NoFix`, `3D`, `NONE`, `LOST`, `OK`, `V`, `A`); a number below \
             0: no position",
-        "rows of words for no position are left out and counted where other rows have words for one; of other \
+        "rows of words for no position are skipped and counted where other rows have words for one; of other \
             numbers and words a warning, where positions jump as they change",
     ),
     known(

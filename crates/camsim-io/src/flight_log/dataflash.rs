@@ -5,7 +5,7 @@
 //! | `POS` | `Lat`, `Lng` (deg), `Alt` (m above mean sea level), with the attitude of `ATT` |
 //! | `AHR2`, `SIM` | the same with `Roll`, `Pitch`, `Yaw` (deg) of their own |
 //! | `XKF1`, `NKF1` | `PN`, `PE`, `PD` (m) from the origin in `ORGN`, with `Roll`, `Pitch`, `Yaw` |
-//! | `GPS`, `GPS2`, `GPSB` | `Lat`, `Lng`, `Alt`; rows without a 3D fix are left out |
+//! | `GPS`, `GPS2`, `GPSB` | `Lat`, `Lng`, `Alt`; rows without a 3D fix are skipped |
 //! | `ATT` | `Roll`, `Pitch`, `Yaw` (deg, from true north) |
 //! | `XKQ`, `NKQ` | `Q1` to `Q4`: w, x, y, z |
 //!
@@ -190,7 +190,7 @@ impl Chosen<'_, '_> {
         }
         if without_fix > 0 {
             notes.push(Note::warning(format!(
-                "{without_fix} positions of `{name}` have no 3D fix, and are left out"
+                "{without_fix} positions of `{name}` have no 3D fix, and are skipped"
             )));
         }
         Ok(Stream { name, rows })

@@ -3,8 +3,8 @@
 //! | tag | |
 //! |---|---|
 //! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks are one log |
-//! | `trkpt` without `time`, or without `ele` where others have one | left out, counted |
-//! | `fix` | points of `none`, and of `2d` where others have three dimensions, are left out with a warning |
+//! | `trkpt` without `time`, or without `ele` where others have one | skipped, counted |
+//! | `fix` | points of `none`, and of `2d` where others have three dimensions, are skipped with a warning |
 //! | `unit` of an `ele` | applied |
 //! | `wpt`, `rte`, `extensions` and other tags of a point | not used, named in a note |
 
@@ -72,7 +72,7 @@ fn with_fix<'a, 'b>(points: &[Node<'a, 'b>], notes: &mut Vec<Note>) -> Vec<Node<
         points.iter().copied().filter(|&point| dimensions(point) >= least).collect();
     if flown.len() < points.len() {
         notes.push(Note::warning(format!(
-            "{} of {} track points have no {}fix (`fix`), and are left out",
+            "{} of {} track points have no {}fix (`fix`), and are skipped",
             points.len() - flown.len(),
             points.len(),
             if least == 3 { "3D " } else { "" }

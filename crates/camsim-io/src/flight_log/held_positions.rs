@@ -56,7 +56,7 @@ pub(super) fn interpolated(
         format_short(period_ns as f64 * 1e-9)
     );
     if left_out > 0 {
-        text += &format!(", and {left_out} rows beyond the first or last change are left out");
+        text += &format!(", and {left_out} rows beyond the first or last change are skipped");
     }
     notes.push(Note::warning(text));
     rows

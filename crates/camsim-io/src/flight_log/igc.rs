@@ -7,7 +7,7 @@
 //! | `I` | `LAD`, `LOD` (more decimals of minutes) and `TDS` (decimals of seconds) in `B` |
 //!
 //! Heights of satellite navigation are above the ellipsoid unless the record says otherwise; those by air
-//! pressure are of the standard atmosphere, not above any datum. A fix without height (`V`) is left out where
+//! pressure are of the standard atmosphere, not above any datum. A fix without height (`V`) is skipped where
 //! others have one.
 
 use camsim_core::{
@@ -115,7 +115,7 @@ pub(super) fn read(text: &str, spec: &FlightSpec) -> Result<RawLog, String> {
     }
     if fixes.len() < count {
         let text =
-            format!("{} of {count} fixes have no GNSS height (V), and are left out", count - fixes.len());
+            format!("{} of {count} fixes have no GNSS height (V), and are skipped", count - fixes.len());
         notes.push(Note::warning(text));
     }
     let rows = fixes.iter().map(|fix| {

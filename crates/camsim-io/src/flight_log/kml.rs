@@ -79,7 +79,7 @@ fn track(track: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
     if times.len() != positions.len() || !(angles.is_empty() || angles.len() == times.len()) {
         return Err(format!(
             "line {}: the gx:Track has {} when, {} gx:coord and {} gx:angles: each point needs one of each \
-                (gx:angles may be left out for all)",
+                (gx:angles may be omitted for all)",
             line(track),
             times.len(),
             positions.len(),

@@ -5,7 +5,7 @@
 //! | `geometry_msgs/PoseStamped`, `PoseWithCovarianceStamped`, `TransformStamped` | position and orientation |
 //! | `nav_msgs/Odometry` | the pose |
 //! | `tf2_msgs/TFMessage` | the transforms to one child frame, as `/tf#base_link` |
-//! | `sensor_msgs/NavSatFix` | latitude, longitude, height above the ellipsoid; rows without a fix are left out |
+//! | `sensor_msgs/NavSatFix` | latitude, longitude, height above the ellipsoid; rows without a fix are skipped |
 //! | `sensor_msgs/Imu` | the orientation, beside a `NavSatFix` |
 //!
 //! Axes are those of ROS (REP 103): worlds have x east, y north, z up, bodies x forward, y left, z up, unless
@@ -192,7 +192,7 @@ fn stream(key: &TopicKey, samples: &[Sample], with_attitude: bool, notes: &mut V
         rows.push(row);
     }
     if without_fix > 0 {
-        let text = format!("{without_fix} messages of `{name}` have no fix, and are left out");
+        let text = format!("{without_fix} messages of `{name}` have no fix, and are skipped");
         notes.push(Note::warning(text));
     }
     if without_stamp > 0 {

@@ -124,7 +124,7 @@ pub(super) fn receivers_note(
 ) -> Note {
     let all: Vec<String> = counts.iter().map(|(name, rows)| format!("`{name}` ({rows} rows)")).collect();
     Note::warning(format!(
-        "{} has rows of {}: {which}, and {} rows are left out; keep the rows of one to choose another",
+        "{} has rows of {}: {which}, and {} rows are skipped; keep the rows of one to choose another",
         layout.describe(receiver),
         all.join(" and "),
         keeps.iter().filter(|keeps| !**keeps).count()
@@ -260,7 +260,7 @@ fn well_judged<'a>(
         )));
         return Ok(table);
     }
-    notes.push(Note::warning(format!("{left_out} rows {lack} by {name}, and are left out{other}")));
+    notes.push(Note::warning(format!("{left_out} rows {lack} by {name}, and are skipped{other}")));
     let keeps: Vec<bool> = judged.iter().map(|counts| *counts != Some(false)).collect();
     Ok(table.with_rows_kept(&keeps))
 }

@@ -56,7 +56,7 @@ pub(super) fn interpolated(
         rows.retain(|row| !is_empty_row(row));
         let text = format!(
             "{empty} rows state neither a whole position nor an attitude, as in tables merged from several \
-                streams, and are left out"
+                streams, and are skipped"
         );
         notes.push(Note::information(text));
     }

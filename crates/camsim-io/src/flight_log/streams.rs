@@ -127,7 +127,7 @@ fn merge(position: Stream, attitude: Stream, is_geodetic: bool, notes: &mut Vec<
     let outside = before - rows.len();
     if outside > 0 {
         notes.push(Note::information(format!(
-            "{outside} of {} attitudes are before the first or after the last position, and are left out",
+            "{outside} of {} attitudes are before the first or after the last position, and are skipped",
             attitude.rows.len()
         )));
     }

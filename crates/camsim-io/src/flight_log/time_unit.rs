@@ -298,7 +298,7 @@ fn motion(rows: &[ParsedRow], layout: &TableLayout) -> Motion {
         .map(|pair| (pair[1].0 - pair[0].0, distance_m(pair[0].1, pair[1].1, geodetic)))
         .filter(|(step, distance)| *step > 0.0 && distance.is_finite())
         .collect();
-    // Spikes and gaps are left out of the mean speed.
+    // Spikes and gaps do not count in the mean speed.
     let mut distances: Vec<f64> =
         moves.iter().map(|(_, distance)| *distance).filter(|distance| *distance > 0.0).collect();
     let median_distance = median(&mut distances, f64::total_cmp).unwrap_or(0.0);

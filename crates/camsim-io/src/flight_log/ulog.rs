@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `vehicle_global_position`, `estimator_global_position` | `lat`, `lon` (deg), `alt` (m above mean sea level) or `alt_ellipsoid` |
 //! | `vehicle_local_position`, `estimator_local_position` | `x`, `y`, `z` (m north, east, down); with `ref_lat`, `ref_lon`, `ref_alt` they become geodetic by PX4's own projection |
-//! | `vehicle_gps_position`, `sensor_gps` | both spellings of latitude, longitude and the two heights; rows without a 3D fix are left out |
+//! | `vehicle_gps_position`, `sensor_gps` | both spellings of latitude, longitude and the two heights; rows without a 3D fix are skipped |
 //! | `vehicle_odometry`, `vehicle_visual_odometry` | `position` (m north, east, down) with `q` |
 //! | `vehicle_attitude`, `estimator_attitude` | `q`: w, x, y, z; takes forward-right-down to north-east-down |
 //!

@@ -173,7 +173,7 @@ fn calibrations(lens: Node<'_, '_>) -> Result<Vec<Calibration>, String> {
         let nodes: Vec<Node<'_, '_>> =
             calibration.children().filter(|child| child.has_tag_name("distortion")).collect();
         let model = nodes.first().and_then(|node| node.attribute("model")).unwrap_or("none").to_owned();
-        // As lensfun does: entries of another model than the first are left out.
+        // As lensfun does: entries of another model than the first are skipped.
         let same = nodes.iter().filter(|node| node.attribute("model") == Some(&model));
         let mut entries = same.map(|node| entry(*node, &model)).collect::<Result<Vec<_>, String>>()?;
         entries.sort_by(|a, b| a.focal_mm.total_cmp(&b.focal_mm));

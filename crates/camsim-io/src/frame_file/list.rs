@@ -4,7 +4,7 @@
 //! color = "rgb/*.png"                # all pictures of this pattern, ordered by what stands for the *
 //! depth = "depth/*.png"              # paired by equal text for the *; with name_unit, by nearest time
 //! name_unit = "s"                    # the text for the * is a time in s, ms, us or ns
-//! max_gap_ms = 20.0                  # maximum time from colour to depth; colour without depth is left out
+//! max_gap_ms = 20.0                  # maximum time from colour to depth; colour without depth is skipped
 //! ```
 //! ```toml
 //! color = "rgb.txt"                  # a list of `time file` in seconds, as in the TUM benchmarks
@@ -45,7 +45,7 @@ pub struct FrameEntry {
 pub(super) struct FrameList {
     /// Frames in order.
     pub(super) entries: Vec<FrameEntry>,
-    /// Number of colour pictures left out because no depth is near in time.
+    /// Number of colour pictures skipped because no depth is near in time.
     pub(super) left_out: usize,
     /// Whether it names a pattern, list or table, not one picture.
     pub(super) several: bool,

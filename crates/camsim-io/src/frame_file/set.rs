@@ -67,7 +67,7 @@ impl FrameSet {
         &self.entries
     }
 
-    /// Number of colour pictures left out because no depth is near in time.
+    /// Number of colour pictures skipped because no depth is near in time.
     #[must_use]
     pub fn left_out(&self) -> usize {
         self.left_out

@@ -13,13 +13,13 @@ const KEYS: &[KeyTreatment] = &[
     ),
     ("name_unit", "`s`, `ms`, `us`, `ns`: what stands for the * in names is a time"),
     ("fps", "times for frames that have none"),
-    ("max_gap_ms", "how far depth may be from its colour in time; 20 if left out"),
+    ("max_gap_ms", "how far depth may be from its colour in time; 20 if omitted"),
     ("color", "EXR, PNG (8 and 16 bits), JPEG, BMP, PNM, GIF, TIFF, WebP; a pattern with *, or a list"),
     ("color_channels", "of an EXR: one name (grey) or three"),
     ("color_layer", "of an EXR"),
     (
         "color_space",
-        "`srgb` or `linear`; left out linear for EXR, sRGB for others; asked for where a TIFF is of floats \
+        "`srgb` or `linear`; omitted: linear for EXR, sRGB for others; asked for where a TIFF is of floats \
             or a PNG states another gamma",
     ),
     ("depth", "EXR, PFM, TIFF, .npy, 16-bit PNG or PGM; packed: PNG, BMP, PPM; a pattern, or a list"),
@@ -33,7 +33,7 @@ const KEYS: &[KeyTreatment] = &[
     (
         "depth_per_metre",
         "the stored value of one metre: depth is the number stored over it. Needed for whole numbers; of \
-            floats 1 if left out, but asked for where all of them are whole numbers above 100, as \
+            floats 1 if omitted, but asked for where all of them are whole numbers above 100, as \
             millimetres are. With `inverse`: the stored value of 1/m, always needed",
     ),
     ("depth_rows", "of a PFM: `bottom-up`, as the format says, or `top-down`; asked for"),
@@ -48,7 +48,7 @@ const KEYS: &[KeyTreatment] = &[
     ("focal_px", "of the ideal frame"),
     (
         "principal_point_px",
-        "from the first pixel's centre; left out the middle of the picture, of an EXR that of its display \
+        "from the first pixel's centre; omitted: the middle of the picture, of an EXR that of its display \
             window",
     ),
     ("instant_ms", "when it was taken, from its stamp"),
@@ -81,7 +81,7 @@ const FILES: &[(&str, &str, &str)] = &[
         "`scale x stored + offset` in that unit, metres where none is stated; a warning tells of them. \
             Refused where depth_per_metre says another, or the unit is not known",
     ),
-    ("TIFF: mask of its own, `.msk`", "applied", "what they leave out is no depth"),
+    ("TIFF: mask of its own, `.msk`", "applied", "pixels beyond the mask have no depth"),
     ("PNG of depth: sBIT, pCAL, sCAL", "named", ""),
     (
         "TIFF: kinds of samples",
@@ -107,11 +107,11 @@ const FILES: &[(&str, &str, &str)] = &[
         "a turned picture and its depth may be of either sense",
     ),
     ("ICC profile", "named", "unless it is one of sRGB"),
-    ("PNG: gAMA", "refused", "where it is not that of sRGB and color_space is left out"),
+    ("PNG: gAMA", "refused", "where it is not that of sRGB and color_space is omitted"),
     (
         "PNG: cICP",
         "refused",
-        "where its curve is not that of sRGB and color_space is left out; else named where it is not 1, 13, \
+        "where its curve is not that of sRGB and color_space is omitted; else named where it is not 1, 13, \
             0, 1",
     ),
     ("PNG: cHRM", "named", "where it is not that of sRGB"),

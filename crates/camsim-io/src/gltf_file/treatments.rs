@@ -94,7 +94,7 @@ pub(super) const PROPERTIES: &[SupportRow] = &[
     ("TEXCOORD_n, texCoord", Applied, "any set"),
     ("wrapS, wrapT, magFilter", Applied, "repeat, mirror, clamp; nearest or linear"),
     ("minFilter", Irrelevant, "textures are averaged over the pixel"),
-    ("bufferView left out", Applied, "values are 0, except sparse ones; reported where all are 0"),
+    ("bufferView omitted", Applied, "values are 0, except sparse ones; reported where all are 0"),
     ("sparse, normalized, byteStride", Applied, "as stored"),
     ("mode", Applied, "triangles, strips, fans; points and lines are reported"),
     ("NORMAL", Applied, "with the scene's light; else nothing is shaded"),

@@ -179,7 +179,7 @@ fn add_model(
                 .terrain
                 .as_ref()
                 .and_then(|terrain| terrain.down_at(position_ned_m.x, position_ned_m.y));
-            // Some of many scattered copies may lie off the terrain and are left out. If all do, that is a
+            // Some of many scattered copies may lie off the terrain and are skipped. If all do, that is a
             // mistake.
             let Some(ground_down_m) = ground else {
                 without_ground += 1;
@@ -204,7 +204,7 @@ fn add_model(
     }
     let far = far_models::notes(scenario, log, spec, &copies, model.spacing_m());
     let left_out = (without_ground > 0)
-        .then(|| format!("{without_ground} of {all} positions have no ground below them and are left out"));
+        .then(|| format!("{without_ground} of {all} positions have no ground below them and are skipped"));
     Ok(notes_of(left_out.into_iter().chain(far).collect()))
 }
 

@@ -58,7 +58,7 @@ fn files(list: &FileList, key: &'static str, endings: &[&str]) -> Result<Vec<Pat
     Ok(files)
 }
 
-/// The files with one of the endings, in order. Sidecar files are left out by this.
+/// The files with one of the endings, in order. Sidecar files are skipped by this.
 fn found(
     path: &Path,
     key: &'static str,

@@ -211,7 +211,7 @@ fn set_changes_keys_before_they_are_checked() {
     assert_eq!(unset.unwrap(), with(&[]).unwrap());
     let of_list =
         with(&[("camera.focal_px", "[400, 400]"), ("camera.focal_px.0", UNSET)]).unwrap_err().to_string();
-    assert_eq!(of_list, "--set camera.focal_px.0=(left out): is an element of a list; give the whole list");
+    assert_eq!(of_list, "--set camera.focal_px.0=(omitted): is an element of a list; give the whole list");
     for (key, value, expected) in [
         ("camera.fsp", "3", "--set camera.fsp=3: camera.fsp: unknown key; did you mean `camera.fps`?"),
         ("camera.fps", "-3", "--set camera.fps=-3: camera.fps: must be a finite number above 0"),

@@ -390,7 +390,7 @@ fn unparsed_backslashes(text: &str) -> Option<String> {
 fn shortened(text: &str) -> String {
     match text.char_indices().nth(SHOWN) {
         Some((end, _)) => format!("{} ...", &text[..end]),
-        None => text.replace(UNSET, "(left out)"),
+        None => text.replace(UNSET, "(omitted)"),
     }
 }
 

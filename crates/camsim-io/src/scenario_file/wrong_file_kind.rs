@@ -170,7 +170,7 @@ fn log_advice(path: &Path, log: &str) -> String {
          keys",
         scenario.display(),
         example(
-            "camera = \"camera.toml\"   # left out: a pinhole of 640x480 that looks along the nose\n",
+            "camera = \"camera.toml\"   # omitted: a pinhole of 640x480 that looks along the nose\n",
             log
         ),
         scenario.display()

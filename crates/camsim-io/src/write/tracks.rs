@@ -254,7 +254,7 @@ impl OldRows {
             if reader.read_line(&mut row)? == 0 {
                 return Ok(None);
             }
-            // A row that is not whole is left out, so that its frame counts as missing.
+            // A row that is not whole is skipped, so that its frame counts as missing.
             let frame = row.split(',').next().and_then(|cell| cell.parse().ok());
             if let (Some(frame), true) = (frame, row.ends_with('\n')) {
                 return Ok(Some((frame, row)));

@@ -1,4 +1,4 @@
-//! Cost of each effect of a camera: each is left out alone, and one after the other until none is left. This
+//! Cost of each effect of a camera: each is removed alone, and one after the other until none is left. This
 //! is done with the variants' own plans, and with the sampling plan of the full camera. The two differ
 //! because an effect can hide errors: without blur, vignette or lens a frame needs finer sampling to keep
 //! `quality.max_error_dn`, so it may take longer. With the same sampling the difference is the cost of the
@@ -42,7 +42,7 @@ pub enum Effect {
     Silhouettes,
 }
 
-/// All effects, in the order in which they are left out.
+/// All effects, in the order in which they are removed.
 pub const EFFECTS: [Effect; 7] = [
     Effect::Noise,
     Effect::Vignette,
@@ -136,7 +136,7 @@ const NO_TOLERANCE_DN: f64 = 255.0;
 /// One row of the ablation.
 #[derive(Clone, Debug, Serialize)]
 pub struct AblationRow {
-    /// Effects that are left out.
+    /// Effects that are removed.
     pub without: String,
     /// Milliseconds a frame, median of the rounds.
     pub ms_per_frame_p50: f64,

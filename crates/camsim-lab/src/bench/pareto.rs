@@ -107,7 +107,7 @@ pub(super) fn is_slower(ratios: &[f64]) -> bool {
 
 /// The planner's rows that are clearly slower than another row of the same case, with at least one clearly
 /// larger error and no smaller one: source error over all pixels (RMS) and away from silhouettes (99th
-/// percentile), and picture error. Rows with the plans of a row above them are left out.
+/// percentile), and picture error. Rows with the plans of a row above them are skipped.
 #[must_use]
 pub fn violations(rows: &[Row]) -> Vec<Violation> {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.same_as.is_none()).collect();

@@ -8,7 +8,7 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{CoordErrors, CoordTruth, Oracle, RenderOptions},
+    reference::{CoordErrors, CoordTruth, ReferenceRenderer, RenderOptions},
     scenario::Channel,
     sequence::Sequence,
 };
@@ -57,8 +57,8 @@ impl Truth {
     /// # Errors
     /// A camera that cannot be used.
     pub fn new(sequence: &Arc<Sequence>) -> Result<Self, BenchError> {
-        let oracle = Arc::new(Oracle::new(sequence.clone())?);
-        let coords = CoordTruth::new(oracle.clone(), FRAME, 0.0);
+        let reference = Arc::new(ReferenceRenderer::new(sequence.clone())?);
+        let coords = CoordTruth::new(reference.clone(), FRAME, 0.0);
         let near = coords.near_silhouettes();
         let valid: Vec<bool> = coords.valid().collect();
         let valid_pixels = [false, true].map(|kind| {
@@ -71,7 +71,7 @@ impl Truth {
             only: Some(only),
             ..RenderOptions::default()
         };
-        let picture = oracle.render(FRAME, &options);
+        let picture = reference.render(FRAME, &options);
         Ok(Self { coords, picture, valid_pixels })
     }
 

@@ -173,7 +173,7 @@ mod tests {
             let (shift, growth) = (blob.centroid_px.distance(centre), blob.area_px2 / area_px2 - 1.0);
             assert!(shift < 5e-3 && growth.abs() < 5e-3, "{blob:?}: {shift} {growth}");
         }
-        // A blob with a pixel without a ray in its rim is left out.
+        // A blob with a pixel without a ray in its rim is skipped.
         frame.color_rgba_mut()[4 * (15 * 64 + 27) + 3] = 0.0;
         assert_eq!(detect_blobs(&frame).len(), 1);
     }

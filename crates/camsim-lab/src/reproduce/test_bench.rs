@@ -9,7 +9,7 @@ use camsim_core::{
     metrics::{Comparison, ImageView, compare},
     mount::CameraPath,
     pose::BodyState,
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{
         CameraSpec, Channel, FlightSpec, LensModel, LensSpec, MountSpec, QualitySpec, Scenario, ShutterSpec,
     },
@@ -258,8 +258,8 @@ pub fn difference(a: &RenderedFrame, b: &RenderedFrame) -> Result<Comparison, Re
 ///
 /// # Errors
 /// An invalid camera or shutter.
-pub fn reference(sequence: &Arc<Sequence>) -> Result<Oracle, ReproduceError> {
-    Oracle::new(sequence.clone()).map_err(|error| ReproduceError::setup("the camera", error))
+pub fn reference(sequence: &Arc<Sequence>) -> Result<ReferenceRenderer, ReproduceError> {
+    ReferenceRenderer::new(sequence.clone()).map_err(|error| ReproduceError::setup("the camera", error))
 }
 
 /// Number of pixels of frame 0 that show the target where the exact ray through their centre hits nothing, or

@@ -33,7 +33,7 @@ pub(super) struct StepError {
 }
 
 /// RMS errors at the given image points for a time shift of one second, in which the camera rotates by 36 deg
-/// about `axis` (camera axes). Points that leave the front of the camera are left out.
+/// about `axis` (camera axes). Points that leave the front of the camera are skipped.
 pub(super) fn step_errors(points: &[DVec2], focal_px: f64, axis: DVec3) -> Vec<StepError> {
     let angle_rad = TURN_DEG_S.to_radians();
     let twist = Twist { rate_rad_s: axis * angle_rad, ..Twist::default() };

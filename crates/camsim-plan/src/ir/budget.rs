@@ -6,7 +6,7 @@ use super::predicted::SilhouetteError;
 
 /// Part of `quality.max_error_px` that the exposure's path between its nodes may miss.
 const EXPOSURE_PATH: f64 = 0.5;
-/// Part of `quality.max_error_px` that a bound on what is left out may take.
+/// Part of `quality.max_error_px` that a bound on what is omitted may take.
 const BOUND: f64 = 0.5;
 /// Part of `quality.max_error_px` that the terrain's level of detail may take.
 const TERRAIN_OF_PX: f64 = 0.3;
@@ -76,7 +76,7 @@ impl ErrorBudget {
         EXPOSURE_PATH * self.source_px
     }
 
-    /// Bound on what is left out, ideal pixels.
+    /// Bound on what is omitted, ideal pixels.
     pub fn bound_px(&self) -> f64 {
         BOUND * self.source_px
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Work that this frame does not need.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Skip {
-    /// What is left out.
+    /// What is omitted.
     pub what: &'static str,
     /// Why nothing is lost.
     pub reason: String,

@@ -7,7 +7,7 @@
 //! samples over the exposure. The exact pixel is the mean over its area and over the exposure. The squared
 //! difference of the two, weighed by the spectrum, is the expected squared error. Not a bound: textures are
 //! taken to have the same spectrum in all directions, and silhouettes are not in it. Measured against the
-//! oracle's pictures away from silhouettes: docs/theory/ACCURACY.md.
+//! reference's pictures away from silhouettes: docs/theory/ACCURACY.md.
 
 use std::sync::{Arc, PoisonError};
 

@@ -8,7 +8,7 @@
 //! the part of the picture that the probe stands for. As many times more probes find it there, and each
 //! counts for as much less.
 //!
-//! Measured against the oracle over eight frames each of the towns of `camsim bench` the fraction is 0.8 to 1.6
+//! Measured against the reference over eight frames each of the towns of `camsim bench` the fraction is 0.8 to 1.6
 //! times the true one. It is too large, up to twice, where what hides is narrower than a probe's part of the
 //! picture.
 

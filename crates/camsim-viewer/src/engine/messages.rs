@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use camsim_core::{reference::Oracle, scenario::Scenario, sequence::Sequence};
+use camsim_core::{reference::ReferenceRenderer, scenario::Scenario, sequence::Sequence};
 use camsim_io::load::Loaded;
 use eframe::egui::ColorImage;
 
@@ -23,12 +23,12 @@ pub enum Stage {
     /// Time, with light, vignette and noise: what `camsim render` writes.
     Photometric,
     /// The photometric stage by exact rays, on the CPU.
-    Oracle,
+    Reference,
 }
 
 impl Stage {
-    /// All stages in pipeline order, the oracle last.
-    pub const ALL: [Self; 5] = [Self::Ideal, Self::Lens, Self::Time, Self::Photometric, Self::Oracle];
+    /// All stages in pipeline order, the reference last.
+    pub const ALL: [Self; 5] = [Self::Ideal, Self::Lens, Self::Time, Self::Photometric, Self::Reference];
 
     /// Text of its button.
     pub fn label(self) -> &'static str {
@@ -37,7 +37,7 @@ impl Stage {
             Self::Lens => "+ lens",
             Self::Time => "+ time",
             Self::Photometric => "+ photometric",
-            Self::Oracle => "oracle",
+            Self::Reference => "reference",
         }
     }
 
@@ -50,7 +50,7 @@ impl Stage {
             Self::Photometric => {
                 "time, with light, vignette and noise: the pixels that `camsim render` writes"
             }
-            Self::Oracle => {
+            Self::Reference => {
                 "the photometric stage by exact rays, each at its own instant, on the CPU: slow, row by row"
             }
         }
@@ -75,7 +75,7 @@ pub struct FrameRequest {
     pub reload_count: u64,
     /// Frame number, clamped to the last one.
     pub frame: u64,
-    /// Stages to render, never [`Stage::Oracle`].
+    /// Stages to render, never [`Stage::Reference`].
     pub stages: Vec<Stage>,
     /// Size of the pictures.
     pub size: Size,
@@ -87,9 +87,9 @@ pub struct FrameRequest {
     pub gain: Option<f32>,
 }
 
-/// What the window needs of the oracle.
+/// What the window needs of the reference.
 #[derive(Clone, Debug)]
-pub struct OracleRequest {
+pub struct ReferenceRequest {
     /// The sequence to trace rays in.
     pub sequence: Arc<Sequence>,
     /// The frame to render; `None` for exact rays of single pixels only.
@@ -112,9 +112,9 @@ pub enum Reply {
     /// Predicted errors of pictures that were sent before.
     Errors(Box<ErrorsReply>),
     /// Exact rays in a sequence are ready.
-    Oracle(Arc<Oracle>),
-    /// The oracle's picture; rows may still be missing.
-    OraclePicture(Box<OraclePicture>),
+    Reference(Arc<ReferenceRenderer>),
+    /// The reference's picture; rows may still be missing.
+    ReferencePicture(Box<ReferencePicture>),
     /// A fault: what went wrong, and what to do.
     Failed(String),
     /// An event that the user should know of, shown until dismissed.
@@ -160,9 +160,9 @@ pub struct ErrorsReply {
     pub errors: Vec<Arc<ErrorOverlay>>,
 }
 
-/// The oracle's picture with the rows rendered so far.
+/// The reference's picture with the rows rendered so far.
 #[derive(Clone, Debug)]
-pub struct OraclePicture {
+pub struct ReferencePicture {
     /// The sequence that it shows.
     pub sequence: Arc<Sequence>,
     /// Frame number.

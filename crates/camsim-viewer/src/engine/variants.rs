@@ -109,7 +109,7 @@ mod tests {
     fn each_stage_has_its_imperfections_only() {
         let scenario = scenario();
         assert_eq!(stage_scenario(&scenario, Stage::Photometric), scenario);
-        assert_eq!(stage_scenario(&scenario, Stage::Oracle), scenario);
+        assert_eq!(stage_scenario(&scenario, Stage::Reference), scenario);
         let time = stage_scenario(&scenario, Stage::Time).camera;
         assert_eq!((time.photometric.vignette, time.photometric.noise_sigma), (None, 0.0));
         assert_eq!((&time.shutter, &time.lens), (&scenario.camera.shutter, &scenario.camera.lens));

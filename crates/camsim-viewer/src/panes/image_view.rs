@@ -120,9 +120,9 @@ fn draw_stage(ui: &Ui, state: &State, viewport: &ImageViewport, stage: Stage, cl
     );
 }
 
-/// Size of a preview, rows of the oracle, and whether predicted errors are pending.
+/// Size of a preview, rows of the reference, and whether predicted errors are pending.
 fn progress(state: &State, picture: &StagePicture<'_>) -> String {
-    if picture.stage == Stage::Oracle {
+    if picture.stage == Stage::Reference {
         return rows_done(state);
     }
     let is_preview =
@@ -136,10 +136,10 @@ fn progress(state: &State, picture: &StagePicture<'_>) -> String {
     if missing { format!("{size}; predicted error follows") } else { size }
 }
 
-/// Progress of the oracle's picture; empty when it is complete.
+/// Progress of the reference's picture; empty when it is complete.
 fn rows_done(state: &State) -> String {
-    let Some(oracle) = state.engine.current_oracle_picture() else { return String::new() };
-    let (done, all) = (oracle.picture.rows, oracle.picture.sequence.scenario.camera.size_px[1]);
+    let Some(reference) = state.engine.current_reference_picture() else { return String::new() };
+    let (done, all) = (reference.picture.rows, reference.picture.sequence.scenario.camera.size_px[1]);
     if done < all { format!(", {done} of {all} rows") } else { String::new() }
 }
 
@@ -152,7 +152,7 @@ fn difference(ui: &Ui, state: &State, viewport: &ImageViewport) {
     if view.a == view.b {
         return label(&painter, corner, &format!("{pair}: the same picture"));
     }
-    let Some((difference, image)) = state.engine.difference(view.wants_oracle()) else {
+    let Some((difference, image)) = state.engine.difference(view.wants_reference()) else {
         return label(&painter, corner, &format!("{pair}: rendering"));
     };
     let size_px = difference.image.size.map(|side| side as u32);
@@ -162,9 +162,9 @@ fn difference(ui: &Ui, state: &State, viewport: &ImageViewport) {
     } else {
         String::new()
     };
-    // The oracle's picture is always subtracted.
-    let pair = if view.a == Stage::Oracle { format!("{} - oracle", view.b.label()) } else { pair };
-    let progress = if view.wants_oracle() { rows_done(state) } else { String::new() };
+    // The reference's picture is always subtracted.
+    let pair = if view.a == Stage::Reference { format!("{} - reference", view.b.label()) } else { pair };
+    let progress = if view.wants_reference() { rows_done(state) } else { String::new() };
     label(
         &painter,
         corner,

@@ -62,8 +62,8 @@ fn values(ui: &mut Ui, state: &State, picture: &StagePicture<'_>, [x, y]: [u32; 
     };
     ui.separator();
     ui.strong(picture.stage.label());
-    if picture.stage == crate::engine::Stage::Oracle
-        && state.engine.current_oracle_picture().is_some_and(|oracle| y >= oracle.picture.rows)
+    if picture.stage == crate::engine::Stage::Reference
+        && state.engine.current_reference_picture().is_some_and(|reference| y >= reference.picture.rows)
     {
         ui.label("not rendered yet: rows are rendered from the top");
         return;
@@ -83,18 +83,18 @@ fn values(ui: &mut Ui, state: &State, picture: &StagePicture<'_>, [x, y]: [u32; 
     });
 }
 
-/// Exact geometry of a pixel, from the oracle.
+/// Exact geometry of a pixel, from the reference.
 fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan>) {
     let Some(shown) = &state.engine.shown else { return };
     ui.separator();
     ui.strong("by exact rays");
-    let Some(oracle) = state.engine.current_oracle() else {
+    let Some(reference) = state.engine.current_reference() else {
         ui.label("after a pause of the input");
         return;
     };
     let frame = shown.reply.frame;
-    let view = oracle.view(frame);
-    let stamp_s = oracle.stamp_s(frame);
+    let view = reference.view(frame);
+    let stamp_s = reference.stamp_s(frame);
     let mid_s = view.mid_s(pixel);
     let sample = view.sample(pixel, DVec2::ZERO, 0.0);
     facts(ui, "geometry", |ui| {
@@ -110,7 +110,7 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
             Some(sample) => {
                 ray_facts(ui, sample);
                 hit_facts(ui, state, sample);
-                let path = motion::pixel_path(oracle, frame, pixel);
+                let path = motion::pixel_path(reference, frame, pixel);
                 motion_facts(ui, pixel, path.as_ref());
             }
         }
@@ -130,7 +130,7 @@ fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {
     let camera = state.document.as_ref().map(|document| CameraModel::from_spec(&document.scenario.camera));
     match camera {
         Some(Ok(camera)) if camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_some() => {
-            "the oracle has no ray here".into()
+            "the reference has no ray here".into()
         }
         _ => "the lens has no ideal ray here: the pixel lies beyond the fold of its distortion".into(),
     }

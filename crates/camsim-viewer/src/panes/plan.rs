@@ -1,4 +1,4 @@
-//! The plan of the shown frame: passes and times, predicted errors, passes that are left out.
+//! The plan of the shown frame: passes and times, predicted errors, passes that are skipped.
 
 use camsim_plan::Predicted;
 use eframe::egui::{self, RichText, Ui};
@@ -173,9 +173,9 @@ fn picture_error(ui: &mut Ui, predicted: &Predicted) {
     }
 }
 
-/// Passes that are left out, with reasons.
+/// Passes that are skipped, with reasons.
 fn skipped(ui: &mut Ui, picture: &Picture) {
-    egui::CollapsingHeader::new(format!("left out ({})", picture.plan.skipped.len()))
+    egui::CollapsingHeader::new(format!("skipped ({})", picture.plan.skipped.len()))
         .id_salt(("skipped", picture.stage.label()))
         .default_open(true)
         .show(ui, |ui| {

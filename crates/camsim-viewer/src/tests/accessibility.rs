@@ -49,7 +49,7 @@ fn every_control_of_every_pane_has_an_accessible_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let exporter: crate::Exporter = std::sync::Arc::new(|_| Ok("nothing".into()));
     let mut window = Window::with(Some(pattern()), Some(exporter), SIZE);
-    window.settle_oracle();
+    window.settle_reference();
     for tab in Tab::ALL {
         window.state_mut().view.tab = tab;
         window.state_mut().pinned = (tab == Tab::Pixel).then_some([320, 240]);

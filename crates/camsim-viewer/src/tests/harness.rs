@@ -173,11 +173,11 @@ impl Window {
         self.settle();
     }
 
-    /// Runs passes until the oracle is ready for the shown sequence.
+    /// Runs passes until the reference is ready for the shown sequence.
     #[track_caller]
-    pub fn settle_oracle(&mut self) {
+    pub fn settle_reference(&mut self) {
         self.settle();
-        self.wait("the oracle", |state| state.engine.current_oracle().is_some());
+        self.wait("the reference", |state| state.engine.current_reference().is_some());
     }
 
     #[track_caller]

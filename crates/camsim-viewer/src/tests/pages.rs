@@ -21,7 +21,7 @@ use crate::{message::Message, motion, view::Tab};
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn the_inspector_shows_the_geometry_of_the_pixel() {
     let mut window = Window::open(Some(demo()));
-    window.settle_oracle();
+    window.settle_reference();
     let pixel = [300, 400];
     send(&mut window, Message::Pin(Some(pixel)));
     window.step();
@@ -39,7 +39,7 @@ fn the_inspector_shows_the_geometry_of_the_pixel() {
     assert_eq!(a, 255);
     assert!(has(&window, &format!("{r} {g} {b}")), "the codes");
     // Pinning a pixel requests the predicted errors near it.
-    window.settle_oracle();
+    window.settle_reference();
     window.wait("its errors", |state| {
         state.engine.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty())
     });
@@ -60,9 +60,9 @@ fn the_inspector_shows_the_geometry_of_the_pixel() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn the_middle_of_each_exposure_path_is_the_pixel() {
     let mut window = Window::open(Some(demo()));
-    window.settle_oracle();
-    let oracle = Arc::clone(window.state().engine.current_oracle().expect("the oracle"));
-    let paths = motion::grid_paths(&oracle, 0);
+    window.settle_reference();
+    let reference = Arc::clone(window.state().engine.current_reference().expect("the reference"));
+    let paths = motion::grid_paths(&reference, 0);
     assert!(paths.len() > 100, "{}", paths.len());
     for path in paths.iter() {
         // A pixel's time is its mid-exposure.

@@ -21,7 +21,7 @@ fn rows(window: &Window, x: [f32; 2], first: &str, last: &str) -> Rect {
 fn panes_match_their_snapshots() {
     let exporter: crate::Exporter = Arc::new(|_| Ok("nothing".into()));
     let mut window = Window::with(Some(pattern()), Some(exporter), [1200.0, 800.0]);
-    window.settle_oracle();
+    window.settle_reference();
     let right = window.harness.get_by_label("picture").rect().right() + 10.0;
     let page = [right, 1192.0];
 
@@ -45,7 +45,7 @@ fn panes_match_their_snapshots() {
     window.snapshot("notices", part);
     send(&mut window, Message::Dismiss(0));
     send(&mut window, Message::Undo);
-    window.settle_oracle();
+    window.settle_reference();
     let part =
         window.harness.get_by_label("single").rect().union(window.harness.get_by_label("depth").rect());
     let pane = window.harness.get_by_label("picture").rect();

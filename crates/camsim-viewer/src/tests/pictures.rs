@@ -1,4 +1,4 @@
-//! Pictures: stages, comparison, overlays, the oracle.
+//! Pictures: stages, comparison, overlays, the reference.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -145,7 +145,7 @@ fn stages_are_compared_by_wipe_difference_and_side_by_side() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn overlays_are_drawn_and_depth_replaces_colour() {
     let mut window = Window::open(Some(pattern()));
-    window.settle_oracle();
+    window.settle_reference();
     let plain = window.picture();
     let overlays =
         Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
@@ -208,22 +208,22 @@ fn has_errors(state: &State) -> bool {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn the_oracle_picture_agrees_with_the_rendered_one() {
+fn the_reference_picture_agrees_with_the_rendered_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::open(Some(small(folder.path())));
     window.settle();
     window.click("difference");
-    window.click("B: oracle");
+    window.click("B: reference");
     window.settle();
     window.wait("all rows", |state| {
         state
             .engine
-            .current_oracle_picture()
-            .is_some_and(|oracle| oracle.picture.rows == 24 && oracle.picture.difference.is_some())
+            .current_reference_picture()
+            .is_some_and(|reference| reference.picture.rows == 24 && reference.picture.difference.is_some())
     });
     let (difference, _) = window.state().engine.difference(true).expect("a difference");
     let predicted_dn = window.state().engine.picture().expect("a picture").plan.predicted.picture_dn();
-    // The oracle's pixels have a standard error of a quarter of max_error_dn, which is 1.
+    // The reference's pixels have a standard error of a quarter of max_error_dn, which is 1.
     assert!(
         difference.rms_dn < predicted_dn.max(1.0) + 0.5,
         "{} of {predicted_dn} predicted",

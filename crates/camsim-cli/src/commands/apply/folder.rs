@@ -152,7 +152,7 @@ pub(super) fn run(
     console.note(format_args!("{} frames{skipped} in {elapsed_s:.2} s in {}", todo.len(), folder.display()));
     if set.left_out() > 0 {
         console.warn(format_args!(
-            "{} colour images have no depth image near their time and are left out",
+            "{} colour images have no depth image near their time and are skipped",
             set.left_out()
         ));
     }

@@ -1,7 +1,7 @@
 //! Light on the terrain, baked into its texture: each texel is multiplied by the light at its ground point.
 //!
 //! Distant terrain is drawn with fewer triangles, and light by triangle would change with the level of
-//! detail. Baked light is the same from everywhere, for the renderers and the oracle alike. Normals are those
+//! detail. Baked light is the same from everywhere, for the renderers and the reference alike. Normals are those
 //! of smooth ground (central differences between neighbouring heights), because the facets of a DEM do not
 //! exist on the ground, and their edges would show. Light is linear within the triangles of the DEM.
 

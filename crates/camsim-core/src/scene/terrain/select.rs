@@ -192,7 +192,7 @@ impl DrawnCell {
 /// Triangles of one chunk.
 struct ChunkMesh {
     indices: Vec<u32>,
-    /// Number of back faces left out.
+    /// Number of back faces skipped.
     back_facing: u64,
     /// Smallest distance of an error below its tolerance, as in [`HierarchyWalk::nearest`].
     nearest: Option<i32>,
@@ -314,7 +314,7 @@ fn north_west([a, b, _]: [u32; 3]) -> u32 {
 struct TriangleEmitter<'a> {
     indices: Vec<u32>,
     base: u32,
-    /// Back-face test, if back faces are left out.
+    /// Back-face test, if back faces are skipped.
     facing: Option<BackFaceTest<'a>>,
     back_facing: u64,
     /// Vertex table of a chunk that is smaller than the lattice or has voids.

@@ -23,7 +23,7 @@ fn check(name: &str, case: &Case, most_px: f64, most_dn: f64) {
         let made = case.render_from(&ideal, phase);
         let frame = case.frame(&made);
         let errors =
-            coord_errors(&case.oracle, 0, &case.plan.ideal_view(), &frame, f64::from(phase as f32), 1)
+            coord_errors(&case.reference, 0, &case.plan.ideal_view(), &frame, f64::from(phase as f32), 1)
                 .unwrap();
         let dn = rms_dn(&made.0, &expected, |_| true);
         eprintln!(
@@ -33,7 +33,7 @@ fn check(name: &str, case: &Case, most_px: f64, most_dn: f64) {
         assert!(errors.missing == 0 && errors.falsely_valid == 0 && errors.all.count > 1500, "{errors:?}");
         assert!(errors.all.max_px < most_px, "{name} at {phase}: {errors:?}");
         assert!(dn < most_dn, "{name}: {dn}");
-        let view = case.oracle.view(0);
+        let view = case.reference.view(0);
         for (i, pixel) in case.pixels() {
             let sample = view.sample(pixel, DVec2::ZERO, 0.0);
             let Some(hit) = sample.and_then(|sample| sample.hit) else { continue };
@@ -145,13 +145,13 @@ fn solvers_of_constant_twist_follow_a_constant_twist() {
         let name = format!("{solver:?} {rate}");
         let made = case.render(0.5);
         let view = case.plan.ideal_view();
-        let errors = coord_errors(&case.oracle, 0, &view, &case.frame(&made), 0.5, 1).unwrap();
+        let errors = coord_errors(&case.reference, 0, &view, &case.frame(&made), 0.5, 1).unwrap();
         eprintln!("{name}: {:?}, {errors:?}", case.plan.temporal);
         assert!(matches!(case.plan.temporal, TemporalStage::Linear | TemporalStage::Rk2));
         assert!(errors.all.max_px < most_px && errors.missing == 0, "{name}: {errors:?}");
         let dn = rms_dn(&made.0, &case.expected(), |_| true);
         assert!(dn < 0.6, "{name}: {dn}");
-        let view = case.oracle.view(0);
+        let view = case.reference.view(0);
         for (i, pixel) in case.pixels() {
             let hit = view.sample(pixel, DVec2::ZERO, 0.0).unwrap().hit.unwrap();
             let error = f64::from(made.1[i].depth_m) / hit.depth_m - 1.0;

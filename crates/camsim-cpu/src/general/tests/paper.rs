@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     lens::paper::gauss_newton,
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{Auto, LensModel, LensSpec, Preset},
     scene::srgb_from_linear,
     temporal::{
@@ -36,7 +36,7 @@ fn the_paper_preset_agrees_with_its_twins() {
         let mut case = Case::new(sequence(paper.clone(), steady(200.0, EAST, TURN), scene.clone()));
         // The ideal frame of the paper has no fog of its own.
         let clear = sequence(paper.clone(), steady(200.0, EAST, TURN), ground(2000.0));
-        case.oracle = Oracle::new(Arc::new(clear)).unwrap();
+        case.reference = ReferenceRenderer::new(Arc::new(clear)).unwrap();
         let plan = &case.plan;
         assert_eq!((plan.ray, plan.temporal), (RayStage::GaussNewton, TemporalStage::Rk2));
         let ideal = case.ideal();

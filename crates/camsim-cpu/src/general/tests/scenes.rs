@@ -5,7 +5,7 @@ use std::sync::Arc;
 use camsim_core::{
     frame::{Plane, RenderedFrame},
     photometric::vignette_weights,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Channel, MountSpec, Scenario},
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap, srgb_from_linear},
     sequence::Sequence,
@@ -69,7 +69,7 @@ pub fn sequence(scenario: Scenario, trajectory: Trajectory, scene: Scene) -> Seq
 pub struct Case {
     pub sequence: Arc<Sequence>,
     pub plan: FramePlan,
-    pub oracle: Oracle,
+    pub reference: ReferenceRenderer,
 }
 
 impl Case {
@@ -81,8 +81,8 @@ impl Case {
     pub fn with_channels(sequence: Sequence, channels: &[Channel]) -> Self {
         let sequence = Arc::new(sequence);
         let plan = Planner::new(sequence.clone(), channels, 16_384).unwrap().plan(0).unwrap();
-        let oracle = Oracle::new(sequence.clone()).unwrap();
-        Self { sequence, plan, oracle }
+        let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
+        Self { sequence, plan, reference }
     }
 
     /// With ideal frames that reach farther on all sides.
@@ -140,8 +140,8 @@ impl Case {
     pub fn ideal_pixel(&self, number: usize, position_px: DVec2) -> (f64, DVec3) {
         let (ideal, pose) = (&self.plan.ideal, &self.plan.keys[number].pose);
         let uv = (position_px - ideal.principal_px) / ideal.focal_px;
-        let hit = self.oracle.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0));
-        (hit.map_or(0.0, |hit| 1.0 / hit.depth_m), self.oracle.radiance(pose, uv))
+        let hit = self.reference.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0));
+        (hit.map_or(0.0, |hit| 1.0 / hit.depth_m), self.reference.radiance(pose, uv))
     }
 
     pub fn render(&self, coords_phase: f64) -> (Vec<f32>, Vec<Truth>) {
@@ -198,7 +198,7 @@ impl Case {
     /// The picture of the reference.
     pub fn expected(&self) -> Vec<f32> {
         let options = RenderOptions { tolerance_dn: 0.2, max_samples: 512, ..RenderOptions::default() };
-        self.oracle.render(0, &options).into_color()
+        self.reference.render(0, &options).into_color()
     }
 
     pub fn pixels(&self) -> impl Iterator<Item = (usize, [u32; 2])> {

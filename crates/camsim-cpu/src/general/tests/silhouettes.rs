@@ -43,7 +43,7 @@ fn over_roof(scenario: Scenario, rate: DVec3) -> Case {
 
 /// RMS difference from the reference near silhouettes, DN.
 fn near_silhouettes_dn(case: &Case, ideal: &[IdealImage], expected: &[f32]) -> f64 {
-    let near = reference::silhouettes(&case.oracle, 0, &[-0.5, 0.0, 0.5]);
+    let near = reference::silhouettes(&case.reference, 0, &[-0.5, 0.0, 0.5]);
     assert!(near.iter().filter(|&&near| near).count() > 200);
     rms_dn(&case.render_from(ideal, 0.0).0, expected, |i| near[i])
 }
@@ -104,7 +104,7 @@ fn rays_through_key_frames_agree_with_their_twin() {
             })
             .collect();
         let picture = case.render_from(&ideal, 0.0).0;
-        let near = reference::silhouettes(&case.oracle, 0, &[-0.5, 0.0, 0.5]);
+        let near = reference::silhouettes(&case.reference, 0, &[-0.5, 0.0, 0.5]);
         let mut errors = SilhouetteErrors::default();
         let (mut other_key, mut later_keys) = (0, 0);
         case.with_pass(&ideal, |pass| {
@@ -181,7 +181,7 @@ fn a_second_key_frame_shows_what_the_first_does_not_see() {
     let [one, two] = [1, 2].map(|keys| {
         let case = case(keys);
         assert_eq!(case.plan.keys.len(), keys as usize);
-        let unseen = disocclusion(&case.oracle, 0, &case.plan.key_poses(), &[0.0]).hidden;
+        let unseen = disocclusion(&case.reference, 0, &case.plan.key_poses(), &[0.0]).hidden;
         let dn = near_silhouettes_dn(&case, &case.ideal(), &case.expected());
         eprintln!("{keys} keys: {unseen} pixels see what no key sees, {dn:.2} DN at silhouettes");
         (unseen, dn)
@@ -222,7 +222,7 @@ fn rays_of_constant_twist_see_the_surfaces_too() {
         let rays_dn = near_silhouettes_dn(&case, &ideal, &expected);
         // Coordinates at silhouettes are those of the surface that the pixel's own ray meets.
         let frame = case.frame(&case.render_from(&ideal, 0.0));
-        let errors = coord_errors(&case.oracle, 0, &case.plan.ideal_view(), &frame, 0.0, 1).unwrap();
+        let errors = coord_errors(&case.reference, 0, &case.plan.ideal_view(), &frame, 0.0, 1).unwrap();
         case.plan.edges = EdgeStage::None;
         let plain: Vec<_> = ideal.iter().map(|image| IdealImage { fine: None, ..image.clone() }).collect();
         let plain_dn = near_silhouettes_dn(&case, &plain, &expected);
@@ -240,10 +240,10 @@ fn truth_at_silhouettes_is_left_to_rays_and_right_elsewhere() {
         Case::new(sequence(scenario, steady(120.0, EAST, TURN), ground_and_roof(900.0, 60.0, 15.0)));
     case.plan.temporal = TemporalStage::Reproject { iterations: 4 };
     let ideal = case.ideal();
-    let view = case.oracle.view(0);
+    let view = case.reference.view(0);
     for phase in [0.0, 0.5] {
         let (_, truth) = case.render_from(&ideal, phase);
-        let near = reference::silhouettes(&case.oracle, 0, &[0.0, phase]);
+        let near = reference::silhouettes(&case.reference, 0, &[0.0, phase]);
         let (mut unknown, mut known) = (0, 0);
         for (i, pixel) in case.pixels() {
             if truth[i].depth_m < 0.0 {
@@ -274,8 +274,8 @@ fn depths_of_constant_twist_at_silhouettes_are_those_of_their_surface() {
     let case = Case::new(sequence(scenario, steady(120.0, velocity, DVec3::ZERO), scene));
     assert!(case.plan.edges.has_rays(), "{:?}", case.plan.edges);
     let (_, truth) = case.render(0.0);
-    let near = reference::silhouettes(&case.oracle, 0, &[0.0]);
-    let view = case.oracle.view(0);
+    let near = reference::silhouettes(&case.reference, 0, &[0.0]);
+    let view = case.reference.view(0);
     let (mut far_off, mut compared) = (0, 0);
     for (i, pixel) in case.pixels().filter(|(i, _)| near[*i]) {
         let hit = view.sample(pixel, DVec2::ZERO, 0.0).unwrap().hit.unwrap();

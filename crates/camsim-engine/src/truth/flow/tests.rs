@@ -8,7 +8,7 @@ use camsim_core::{
     camera::CameraModel,
     mount::CameraPath,
     pose::{BodyState, CameraPose},
-    reference::Oracle,
+    reference::ReferenceRenderer,
     row_time::WorldPoint,
     scenario::{
         Axis, Channel, FlightSpec, FlowState, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec,
@@ -110,7 +110,7 @@ fn row_s(frame: i32, y: f64) -> f64 {
 }
 
 /// Pixels of frame 1, all valid.
-fn with_pixels(sequence: Arc<Sequence>, check: impl FnOnce(&FramePixels<'_>, &Oracle)) {
+fn with_pixels(sequence: Arc<Sequence>, check: impl FnOnce(&FramePixels<'_>, &ReferenceRenderer)) {
     let planner = Planner::new(sequence.clone(), &[Channel::Flow], 16_384).unwrap();
     let plan = planner.plan(1).unwrap();
     let rays = planner.frame_rays(&plan, 0.0);
@@ -128,12 +128,12 @@ fn with_pixels(sequence: Arc<Sequence>, check: impl FnOnce(&FramePixels<'_>, &Or
         color_rgba: &color_rgba,
         hits: &hits,
     };
-    check(&pixels, &Oracle::new(sequence).unwrap());
+    check(&pixels, &ReferenceRenderer::new(sequence).unwrap());
 }
 
 #[test]
-fn flow_leads_to_where_the_oracle_sees_the_same_position() {
-    with_pixels(sequence(), |pixels, oracle| {
+fn flow_leads_to_where_the_reference_sees_the_same_position() {
+    with_pixels(sequence(), |pixels, reference| {
         for target in [2, 0] {
             let to = pixels.planner.frame_camera(i64::from(target)).unwrap();
             let (mut visible, mut worst_px) = ([0; 3], 0.0_f64);
@@ -142,12 +142,12 @@ fn flow_leads_to_where_the_oracle_sees_the_same_position() {
                     continue;
                 }
                 let pixel = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
-                let from = oracle.sample(1, pixel, DVec2::ZERO, 0.0).unwrap().hit.unwrap();
+                let from = reference.sample(1, pixel, DVec2::ZERO, 0.0).unwrap().hit.unwrap();
                 let px = DVec2::from_array(pixel.map(f64::from)) + DVec2::new(dx.into(), dy.into());
                 let t_s = row_s(target, px.y);
-                let pose = oracle.sequence().path.pose(t_s);
+                let pose = reference.sequence().path.pose(t_s);
                 let ray = pose.ned_from_camera * pixels.plan.camera.unproject(px).unwrap().extend(1.0);
-                let seen = oracle.cast_at(t_s, pose.position_ned_m, ray).unwrap();
+                let seen = reference.cast_at(t_s, pose.position_ned_m, ray).unwrap();
                 // At a border rounding decides.
                 if seen.surface == from.surface {
                     let size_m = if seen.surface == 2 { 30.0 } else { 500.0 };
@@ -170,9 +170,9 @@ struct Sight {
 }
 
 /// All instants of a frame's readout, a fortieth of a row apart, with the row and the camera.
-fn instants(frame: i32, oracle: &Oracle) -> Vec<(f64, f64, CameraPose)> {
+fn instants(frame: i32, reference: &ReferenceRenderer) -> Vec<(f64, f64, CameraPose)> {
     let rows = (0..=40 * SIZE_PX[1]).map(|k| f64::from(k) / 40.0 - 0.5);
-    rows.map(|y| (y, row_s(frame, y), oracle.sequence().path.pose(row_s(frame, y)))).collect()
+    rows.map(|y| (y, row_s(frame, y), reference.sequence().path.pose(row_s(frame, y)))).collect()
 }
 
 /// Where a frame shows a point, by force; `None` where that hangs on less than the grid of instants tells.
@@ -180,7 +180,7 @@ fn shown(
     point: WorldPoint<'_>,
     camera: &CameraModel,
     instants: &[(f64, f64, CameraPose)],
-    oracle: &Oracle,
+    reference: &ReferenceRenderer,
 ) -> Option<Vec<Sight>> {
     let seen: Vec<Option<(f64, DVec2)>> = instants
         .iter()
@@ -207,7 +207,7 @@ fn shown(
         let (_, t_s, pose) = &instants[k];
         let direction = point.position_ned_m(*t_s)? - pose.position_ned_m;
         let hides = |beside: DVec3| {
-            let hit = oracle.cast_at(*t_s, pose.position_ned_m, direction + beside);
+            let hit = reference.cast_at(*t_s, pose.position_ned_m, direction + beside);
             hit.is_some_and(|hit| hit.depth_m < 0.999)
         };
         let is_hidden = hides(DVec3::ZERO);
@@ -232,16 +232,16 @@ fn of_several_positions_the_nearest_that_is_seen_counts() {
         phase_deg: 20.0,
     });
     let sequence = sequence_with([-20.0, 0.0], [400.0; 2], &vibration);
-    with_pixels(sequence, |pixels, oracle| {
+    with_pixels(sequence, |pixels, reference| {
         // Before, the raft was over what is beside it now.
         let target = pixels.planner.frame_camera(-2).unwrap();
-        let instants = instants(-2, oracle);
+        let instants = instants(-2, reference);
         let mut states = [0; 5];
         for (i, [dx, dy, state]) in flow(pixels, &target).into_iter().enumerate() {
             let pixel = pixels.pixel(i).unwrap();
             let from_px = DVec2::from_array(pixel.position.map(f64::from));
             let point = world_point(pixels, pixel);
-            let Some(mut sights) = shown(point, &pixels.plan.camera, &instants, oracle) else { continue };
+            let Some(mut sights) = shown(point, &pixels.plan.camera, &instants, reference) else { continue };
             sights.sort_by(|a, b| a.px.distance(from_px).total_cmp(&b.px.distance(from_px)));
             let seen: Vec<&Sight> = sights.iter().filter(|sight| !sight.is_hidden).collect();
             let (expected, sight) = match (seen.as_slice(), sights.first()) {
@@ -264,19 +264,19 @@ fn of_several_positions_the_nearest_that_is_seen_counts() {
 
 #[test]
 fn motion_and_blur_are_those_of_the_moved_position() {
-    with_pixels(sequence(), |pixels, oracle| {
-        let (path, camera) = (&oracle.sequence().path, &pixels.plan.camera);
+    with_pixels(sequence(), |pixels, reference| {
+        let (path, camera) = (&reference.sequence().path, &pixels.plan.camera);
         let mut count = 0;
         for (i, hit) in pixels.hits.iter().enumerate() {
             let position = [i as u32 % SIZE_PX[0], i as u32 / SIZE_PX[0]];
             let [u, v] = pixels.truth[i].uv.map(f64::from);
             let pixel = Pixel { position, uv: DVec2::new(u, v), hit: hit.as_ref() };
-            let sample = oracle.sample(1, position, DVec2::ZERO, 0.0).unwrap();
+            let sample = reference.sample(1, position, DVec2::ZERO, 0.0).unwrap();
             let [u, v] = sample.hit.unwrap().texture_uv;
             if sample.hit.unwrap().surface != 2 {
                 continue;
             }
-            let raft = &oracle.sequence().scene.meshes[1];
+            let raft = &reference.sequence().scene.meshes[1];
             let shown = |t_s: f64| {
                 let now = raft.at(t_s);
                 let local = DVec3::new(15.0 * (1.0 - 2.0 * v), 15.0 * (2.0 * u - 1.0), 0.0);

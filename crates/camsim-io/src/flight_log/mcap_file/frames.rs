@@ -188,7 +188,7 @@ pub(in super::super) fn turn(
     let mut axes = (world.unwrap_or(USUAL_WORLD), stated_body.unwrap_or(USUAL_BODY));
     let mut inferred = None;
     if is_upside_down(samples, axes) {
-        // One of the two may be left out of the names, by custom.
+        // By custom, names may omit one of the two.
         if world.is_some_and(|world| world != USUAL_WORLD) && stated_body.is_none() {
             axes.1 = NORTH_EAST_DOWN;
             inferred = Some("its body");

@@ -98,10 +98,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Topics, String> {
             .push("the MCAP file was not closed: its last messages may be missing".to_owned());
     }
     if reader.undecoded > 0 {
-        let text = format!(
-            "{} messages are too short or in an unknown encoding, and are left out",
-            reader.undecoded
-        );
+        let text =
+            format!("{} messages are too short or in an unknown encoding, and are skipped", reader.undecoded);
         reader.topics.damage.push(text);
     }
     reader.topics.split_children();
@@ -204,12 +202,12 @@ impl RecordReader {
         let content = match decompress(header, data) {
             Ok(content) => content,
             Err(problem) => {
-                self.topics.damage.push(format!("a chunk is left out: {problem}"));
+                self.topics.damage.push(format!("a chunk is skipped: {problem}"));
                 return Ok(());
             }
         };
         if header.uncompressed_crc != 0 && crc32fast::hash(&content) != header.uncompressed_crc {
-            self.topics.damage.push("a chunk is left out: its checksum is wrong".to_owned());
+            self.topics.damage.push("a chunk is skipped: its checksum is wrong".to_owned());
             return Ok(());
         }
         let mut rest = &content[..];

@@ -131,7 +131,7 @@ impl PositionReader {
         self.reference.is_some() || matches!(self.fields, PositionFields::Geodetic { .. })
     }
 
-    /// The positions; those that the log itself calls invalid are left out, with a note.
+    /// The positions; those that the log itself calls invalid are skipped, with a note.
     pub(super) fn stream(&self, topic: &Topic<'_>, notes: &mut Vec<Note>) -> Stream {
         let mut rows = Vec::with_capacity(topic.messages.len());
         let (mut left_out, mut reckoned) = (0, 0);
@@ -161,7 +161,7 @@ impl PositionReader {
         if left_out > 0 {
             notes.push(Note::warning(format!(
                 "{left_out} of {} positions of `{name}` are marked as invalid or without a 3D fix, and \
-                        are left out",
+                        are skipped",
                 topic.messages.len()
             )));
         }

@@ -56,7 +56,7 @@ const KEYS: &[KeyRow] = &[
     KeyRow::new(
         Treatment::Readout(1e3),
         "rolling_shutter_tr",
-        "s a frame; named and left out where rolling_shutter is 0",
+        "s a frame; named and ignored where rolling_shutter is 0",
     ),
     reported(
         Neutral::Zero,

@@ -26,7 +26,7 @@ pub(crate) fn write(
     notes.extend(one_lens(&cameras));
     match orb_slam(&cameras, imu) {
         Ok(text) => job.target.text("settings/orb_slam3.yaml", &text)?,
-        Err(error) => notes.push(format!("settings for ORB-SLAM3 are left out: {error}")),
+        Err(error) => notes.push(format!("settings for ORB-SLAM3 are skipped: {error}")),
     }
     let Some(imu) = imu else { return Ok(notes) };
     let (_, lifted) = imu.noise_for_filters();
@@ -39,7 +39,7 @@ pub(crate) fn write(
     }
     match chain_yaml(&cameras, Some(&imu.reference()), PoseKey::ImuCam) {
         Ok(chain) => openvins::write(job, imu, &chain)?,
-        Err(error) => notes.push(format!("settings for OpenVINS are left out: {error}")),
+        Err(error) => notes.push(format!("settings for OpenVINS are skipped: {error}")),
     }
     let same = cameras.iter().take(2).filter(|camera| camera.spec.size_px == cameras[0].spec.size_px).count();
     if same < cameras.len() {
@@ -50,7 +50,7 @@ pub(crate) fn write(
     match write_vins(job, &cameras[..same], imu, body_from_b) {
         Ok(()) => {}
         Err(DatasetError::Calibration(error)) => {
-            notes.push(format!("settings for VINS-Fusion are left out: {error}"));
+            notes.push(format!("settings for VINS-Fusion are skipped: {error}"));
         }
         Err(error) => return Err(error),
     }

@@ -28,7 +28,7 @@ impl Page {
             let _ = write!(text, "\n- cam{i}: camera `{}`", camera.name);
         }
         for name in &run.empty {
-            let _ = write!(text, "\n- camera `{name}` has no frames in this run, and is left out");
+            let _ = write!(text, "\n- camera `{name}` has no frames in this run, and is skipped");
         }
         if run.cameras.len() + run.empty.len() > 1 {
             text.push('\n');

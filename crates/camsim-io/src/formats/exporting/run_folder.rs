@@ -101,7 +101,7 @@ impl RunFolder {
             vec![RunCamera::open(path, String::new())?]
         } else {
             let names = rig_names(path);
-            // Those that --camera has left out have no folder.
+            // Those that --camera does not name have no folder.
             let rendered = names.iter().filter(|name| path.join(name).join(FRAMES_CSV).is_file());
             rendered.map(|name| RunCamera::open(&path.join(name), name.clone())).collect::<Result<_, _>>()?
         };

@@ -19,7 +19,7 @@ pub(crate) enum TwinNeed {
 }
 
 impl TwinNeed {
-    /// Whether a twin is that; the frame's other properties may be left out of it, too.
+    /// Whether a twin is that; it may lack other properties of the frame, too.
     pub(crate) fn fits(self, twin: &TwinSpec) -> bool {
         let is_single = twin.instants.is_none();
         let instant = twin.instant.unwrap_or_default();

@@ -79,7 +79,7 @@ fn range_of_name(name: &str) -> Option<[f64; 2]> {
 }
 
 /// The vignetting of a camera with an aperture, interpolated between the entries. `radius` is half the picture's
-/// diagonal in that of the calibration. `Err` says what is left out and why.
+/// diagonal in that of the calibration. `Err` says what is skipped and why.
 pub(super) fn of_camera(
     entries: &[Vignetting],
     focal_range_mm: [f64; 2],

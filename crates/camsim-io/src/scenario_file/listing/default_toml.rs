@@ -17,14 +17,14 @@ const HEAD: &str = "\
 const RIG: &str = "
 # [[cameras]]                       # instead of [camera]: several cameras on the platform, each with all keys of [camera] (docs/guide/RIGS.md)
 # name = \"left\"                     # required: its folder, and what `--camera left` and `--set cameras.left.fps=10` name
-# file = \"camera.toml\"              # left out: the keys beside it alone; else these replace those of the file
+# file = \"camera.toml\"              # omitted: the keys beside it alone; else these replace those of the file
 # mount = { angles_deg = [0.0, -90.0, 0.0], offset_m = [0.0, -0.1, 0.0] }
 ";
 const RANDOMIZE: &str = "
 # [randomize]                       # values that are drawn: camsim render --variations 0..100; docs/guide/RANDOMIZE.md
 # \"camera.shutter.exposure_ms\" = { uniform = [2, 10] }   # log_uniform | normal = [mean, sigma], clip = [low, high] | integer | choice = [...]
-# seed = 0                          # of the draws; left out: the scenario's
-# variations = 1000                 # how many; left out: --variations says which
+# seed = 0                          # of the draws; omitted: the scenario's
+# variations = 1000                 # how many; omitted: --variations says which
 # own_seed = true                   # a seed for each variation, so that noise differs
 ";
 

@@ -59,7 +59,7 @@ impl Ffmpeg {
         let messages = child.stderr.take().map(|mut stderr| {
             std::thread::spawn(move || {
                 let mut text = String::new();
-                // A message that cannot be read is left out.
+                // A message that cannot be read is skipped.
                 let _ = stderr.read_to_string(&mut text);
                 text
             })

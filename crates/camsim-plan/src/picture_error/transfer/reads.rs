@@ -8,7 +8,7 @@ use super::{
     lanes::{Frequencies4, Sampler},
 };
 
-/// Aliases of which less than this is left are left out: nine together move the error of a pixel by less than
+/// Aliases of which less than this is left are skipped: nine together move the error of a pixel by less than
 /// a hundredth of the wave.
 pub(crate) const UNSEEN: f64 = 1e-3;
 

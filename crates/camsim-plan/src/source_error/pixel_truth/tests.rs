@@ -11,7 +11,7 @@ use crate::Planner;
 use camsim_core::{
     mount::CameraPath,
     pose::BodyState,
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{Channel, FlightSpec, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver},
     scene::{
         Encoding, Mesh, RigidMotion, Scene, Terrain, Texture,
@@ -64,23 +64,23 @@ fn sequence_with(solver: Option<Solver>, motion: Option<Arc<RigidMotion>>) -> Ar
 }
 
 #[test]
-fn pixel_truth_is_that_of_the_oracle() {
+fn pixel_truth_is_that_of_the_reference() {
     let hub = glam::DAffine3::from_translation(DVec3::new(65.0, 5.0, -35.0));
     let axis = DVec3::new(0.0, 0.6, 0.8);
     let spin =
         Joint::new(JointFrame::from_affine(&hub).unwrap(), Track::Spin { axis, hz: 3.0, phase_rad: 0.0 });
     let turning = Arc::new(RigidMotion::new(vec![spin]));
     for motion in [None, Some(turning)] {
-        compare_with_oracle(&sequence_with(None, motion));
+        compare_with_reference(&sequence_with(None, motion));
     }
 }
 
-fn compare_with_oracle(sequence: &Arc<Sequence>) {
+fn compare_with_reference(sequence: &Arc<Sequence>) {
     let plan = Planner::new(sequence.clone(), &[Channel::Coords], 16_384).unwrap();
     let (planner, plan) = (&plan, plan.plan(1).unwrap());
     assert!(plan.has_exact_truth(), "{:?}", plan.temporal);
-    let oracle = Oracle::new(sequence.clone()).unwrap();
-    let view = oracle.view(1);
+    let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
+    let view = reference.view(1);
     let key = plan.ideal_view();
     let mut of_surface = [0; 4];
     for pixel in (0..60).flat_map(|y| (0..80).map(move |x| [x, y])) {

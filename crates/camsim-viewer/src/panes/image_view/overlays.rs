@@ -92,8 +92,10 @@ fn grid(painter: &Painter, viewport: &ImageViewport, camera: &CameraModel) {
 
 /// Draws displacements from the stamp to the row's time, and paths over the exposure.
 fn motion_paths(painter: &Painter, viewport: &ImageViewport, state: &State) {
-    let (Some(oracle), Some(shown)) = (state.engine.current_oracle(), &state.engine.shown) else { return };
-    let paths = motion::grid_paths(oracle, shown.reply.frame);
+    let (Some(reference), Some(shown)) = (state.engine.current_reference(), &state.engine.shown) else {
+        return;
+    };
+    let paths = motion::grid_paths(reference, shown.reply.frame);
     let (displacement_stroke, exposure_stroke) = (
         Stroke::new(1.0, Color32::from_rgb(80, 200, 255)),
         Stroke::new(2.0, Color32::from_rgb(255, 120, 60)),

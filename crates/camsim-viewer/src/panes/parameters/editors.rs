@@ -15,10 +15,10 @@ use crate::{
     message::{Message, Outbox},
 };
 
-/// Keys of twins, all of which but the name may be left out.
+/// Keys of twins, all of which but the name may be omitted.
 const TWINS: &str = "output.twin.";
 
-/// Whether a key is one of a sensor beside the camera, all of which but the name may be left out.
+/// Whether a key is one of a sensor beside the camera, all of which but the name may be omitted.
 fn is_of_sensor(key: &str) -> bool {
     ["imu.", "gnss.", "barometer.", "magnetometer.", "camera.sensor.", "camera.point_spread."]
         .iter()

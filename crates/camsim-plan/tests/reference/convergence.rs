@@ -1,9 +1,9 @@
-//! Error against samples: the law, and whether the error that the oracle states is the one it makes.
+//! Error against samples: the law, and whether the error that the reference states is the one it makes.
 
 use std::sync::LazyLock;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::Scenario,
     scene::Scene,
 };
@@ -26,9 +26,9 @@ fn camera() -> Scenario {
 
 /// Every pixel by a regular grid over its area; instants are the grid's numbers in an order without relation
 /// to it.
-fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
-    let [width, height] = oracle.sequence().scenario.camera.size_px;
-    let view = oracle.view(0);
+fn by_grid(reference: &ReferenceRenderer) -> Vec<DVec3> {
+    let [width, height] = reference.sequence().scenario.camera.size_px;
+    let view = reference.view(0);
     let pixel = |i: u32| {
         let count = SIDE * SIDE;
         let sum: DVec3 = (0..count)
@@ -40,7 +40,7 @@ fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
                     / f64::from(count)
                     - 0.5;
                 let look = view.sample([i % width, i / width], position, phase).unwrap();
-                oracle.color(look.uv, look.hit.as_ref())
+                reference.color(look.uv, look.hit.as_ref())
             })
             .sum();
         sum / f64::from(count)
@@ -49,14 +49,14 @@ fn by_grid(oracle: &Oracle) -> Vec<DVec3> {
 }
 
 /// RMS difference of a rendering with `samples` a pixel, and the error that it states; 1/255.
-fn errors_dn(oracle: &Oracle, truth: &[DVec3], samples: u32) -> (f64, f64) {
+fn errors_dn(reference: &ReferenceRenderer, truth: &[DVec3], samples: u32) -> (f64, f64) {
     let options = RenderOptions {
         min_samples: samples,
         max_samples: samples,
         photometric: false,
         ..RenderOptions::default()
     };
-    let (frame, convergence) = oracle.render_reported(0, &options);
+    let (frame, convergence) = reference.render_reported(0, &options);
     assert_eq!(convergence.samples, u64::from(samples) * truth.len() as u64);
     let squares = frame
         .color_rgba()
@@ -66,21 +66,22 @@ fn errors_dn(oracle: &Oracle, truth: &[DVec3], samples: u32) -> (f64, f64) {
     (255.0 * (squares.sum::<f64>() / truth.len() as f64).sqrt(), convergence.rms_error_dn)
 }
 
-fn oracle(scene: Scene, height_m: f64) -> Oracle {
-    Oracle::new(sequence(camera(), Steady::moving(height_m), scene)).unwrap()
+fn reference(scene: Scene, height_m: f64) -> ReferenceRenderer {
+    ReferenceRenderer::new(sequence(camera(), Steady::moving(height_m), scene)).unwrap()
 }
 
 /// A town and what its pixels are; two tests look at it.
-static TOWN: LazyLock<(Oracle, Vec<DVec3>)> = LazyLock::new(|| {
-    let oracle = oracle(town(60), 150.0);
-    let truth = by_grid(&oracle);
-    (oracle, truth)
+static TOWN: LazyLock<(ReferenceRenderer, Vec<DVec3>)> = LazyLock::new(|| {
+    let reference = reference(town(60), 150.0);
+    let truth = by_grid(&reference);
+    (reference, truth)
 });
 
-fn check(name: &str, oracle: &Oracle, truth: &[DVec3]) {
+fn check(name: &str, reference: &ReferenceRenderer, truth: &[DVec3]) {
     eprintln!("{name}: samples a pixel, RMS error, stated error (1/255)");
     let counts = [32, 64, 128, 256, 512, 1024];
-    let errors: Vec<(f64, f64)> = counts.iter().map(|&samples| errors_dn(oracle, truth, samples)).collect();
+    let errors: Vec<(f64, f64)> =
+        counts.iter().map(|&samples| errors_dn(reference, truth, samples)).collect();
     for (samples, (found, stated)) in counts.iter().zip(&errors) {
         eprintln!("  {samples:5} {found:8.3} {stated:8.3}");
     }
@@ -103,7 +104,7 @@ fn check(name: &str, oracle: &Oracle, truth: &[DVec3]) {
 #[test]
 fn error_falls_with_samples_by_the_law_and_is_stated_honestly() {
     // Squares of a third of a pixel to two pixels: the mean over the area is what counts.
-    let pattern = oracle(plane(400.0), 180.0);
+    let pattern = reference(plane(400.0), 180.0);
     check("fine pattern", &pattern, &by_grid(&pattern));
     check("town", &TOWN.0, &TOWN.1);
 }
@@ -111,11 +112,11 @@ fn error_falls_with_samples_by_the_law_and_is_stated_honestly() {
 /// What a tolerance promises, and that work goes where it is needed.
 #[test]
 fn pixels_are_refined_until_the_tolerance_is_kept() {
-    let (oracle, truth) = &*TOWN;
+    let (reference, truth) = &*TOWN;
     for tolerance_dn in [4.0, 1.0] {
         let options =
             RenderOptions { tolerance_dn, max_samples: 8192, photometric: false, ..RenderOptions::default() };
-        let (frame, convergence) = oracle.render_reported(0, &options);
+        let (frame, convergence) = reference.render_reported(0, &options);
         let squares = frame
             .color_rgba()
             .chunks_exact(4)
@@ -131,6 +132,10 @@ fn pixels_are_refined_until_the_tolerance_is_kept() {
             rms_dn < tolerance_dn && convergence.rms_error_dn < tolerance_dn && convergence.unfinished == 0,
             "{rms_dn} {convergence:?}"
         );
-        assert_eq!(frame.color_rgba(), oracle.render(0, &options).color_rgba(), "a frame has one value only");
+        assert_eq!(
+            frame.color_rgba(),
+            reference.render(0, &options).color_rgba(),
+            "a frame has one value only"
+        );
     }
 }

@@ -3,7 +3,7 @@
 use std::{f64::consts::TAU, sync::Arc};
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{FieldOr, Scenario, ShutterSpec},
     scene::{
         Encoding, Light, Mesh, MeshVertex, RigidMotion, Scene, Shape, Texture, Wrap,
@@ -41,10 +41,10 @@ fn row_s(y: u32) -> f64 {
     0.1 + 1e-3 * READOUT_MS * ((f64::from(y) + 0.5) / f64::from(SIZE_PX[1]) - 0.5)
 }
 
-fn oracle(exposure_ms: f64, meshes: Vec<Mesh>) -> Oracle {
+fn reference(exposure_ms: f64, meshes: Vec<Mesh>) -> ReferenceRenderer {
     let scene = Scene { meshes, ..Scene::default() };
     let steady = Steady::standing(DVec3::new(0.0, 0.0, -HEIGHT_M));
-    Oracle::new(sequence(camera(exposure_ms), steady, scene)).unwrap()
+    ReferenceRenderer::new(sequence(camera(exposure_ms), steady, scene)).unwrap()
 }
 
 /// A white rectangle from `low` to `high` (north, east) on the ground.
@@ -82,9 +82,9 @@ fn spin(hub_m: DVec3, axis: DVec3, hz: f64, phase_rad: f64) -> Joint {
 }
 
 /// Whether a position of frame 1 shows anything at an exposure phase. `x_px` may be within any pixel of the row.
-fn sees(oracle: &Oracle, x_px: f64, y: u32, phase: f64) -> bool {
+fn sees(reference: &ReferenceRenderer, x_px: f64, y: u32, phase: f64) -> bool {
     let pixel = x_px.round().clamp(0.0, f64::from(SIZE_PX[0] - 1));
-    let sample = oracle.view(1).sample([pixel as u32, y], DVec2::new(x_px - pixel, 0.0), phase);
+    let sample = reference.view(1).sample([pixel as u32, y], DVec2::new(x_px - pixel, 0.0), phase);
     sample.unwrap().hit.is_some()
 }
 
@@ -95,13 +95,13 @@ fn a_rectangle_that_moves_sideways_is_sheared_by_the_readout() {
     let speed_px_s = speed_m_s * FOCAL_PX / HEIGHT_M;
     let moved = moving(rectangle([-60.0, -30.0], [60.0, 0.0]), vec![straight(DVec3::Y * speed_m_s)]);
     let exposure_ms = 30.0;
-    let oracle = oracle(exposure_ms, vec![moved]);
+    let reference = reference(exposure_ms, vec![moved]);
     for y in 0..SIZE_PX[1] {
         let edge_px = 31.5 + speed_px_s * row_s(y);
         for phase in [-0.5, 0.0, 0.5] {
             // It blurs over v t_e.
             let edge_px = edge_px + speed_px_s * 1e-3 * exposure_ms * phase;
-            let found = [-1e-6, 1e-6].map(|off_px| sees(&oracle, edge_px + off_px, y, phase));
+            let found = [-1e-6, 1e-6].map(|off_px| sees(&reference, edge_px + off_px, y, phase));
             assert_eq!(found, [true, false], "{y} {phase}");
         }
     }
@@ -112,7 +112,7 @@ fn the_blur_of_an_edge_is_as_long_as_its_path() {
     let (speed_m_s, exposure_ms, y) = (300.0, 40.0, 20);
     let speed_px_s = speed_m_s * FOCAL_PX / HEIGHT_M;
     let length_px = speed_px_s * 1e-3 * exposure_ms;
-    let oracle = oracle(
+    let reference = reference(
         exposure_ms,
         vec![moving(rectangle([-60.0, -200.0], [60.0, 0.0]), vec![straight(DVec3::Y * speed_m_s)])],
     );
@@ -125,7 +125,7 @@ fn the_blur_of_an_edge_is_as_long_as_its_path() {
         tolerance_dn: 0.1,
         ..RenderOptions::default()
     };
-    let frame = oracle.render(1, &options);
+    let frame = reference.render(1, &options);
     let middle_px = 31.5 + speed_px_s * row_s(y);
     let mut in_ramp = 0;
     for x in 0..SIZE_PX[0] {
@@ -153,7 +153,7 @@ fn a_rotor_bends_as_its_closed_form() {
         ned_from_shape: glam::DMat3::from_rotation_z(phase_rad),
         ..rectangle([-200.0, -200.0], [200.0, 0.0])
     };
-    let oracle = oracle(0.0, vec![moving(blade, vec![spin(hub_m, DVec3::Z, hz, phase_rad)])]);
+    let reference = reference(0.0, vec![moving(blade, vec![spin(hub_m, DVec3::Z, hz, phase_rad)])]);
     let mut rows = 0;
     for y in 0..SIZE_PX[1] {
         let angle = phase_rad + TAU * hz * row_s(y);
@@ -164,7 +164,7 @@ fn a_rotor_bends_as_its_closed_form() {
             continue;
         }
         let is_west = angle.cos() > 0.0;
-        let found = [-1e-6, 1e-6].map(|off_px| sees(&oracle, edge_px + off_px, y, 0.0));
+        let found = [-1e-6, 1e-6].map(|off_px| sees(&reference, edge_px + off_px, y, 0.0));
         assert_eq!(found, [is_west, !is_west], "{y} {edge_px}");
         rows += 1;
     }
@@ -211,18 +211,18 @@ fn holed(texture: &Texture) -> Vec<u8> {
 fn rays_meet_what_moves_as_if_it_stood_there() {
     let moving = busy();
     let steady = Steady::standing(DVec3::ZERO);
-    let oracle = Oracle::new(sequence(scenario(), steady, moving.clone())).unwrap();
+    let reference = ReferenceRenderer::new(sequence(scenario(), steady, moving.clone())).unwrap();
     let mut of_surface = [0; 7];
     for t_s in [-0.4, 0.0, 0.21, 0.77] {
         let meshes = moving.meshes.iter().map(|mesh| mesh.at(t_s)).collect();
         let stands = Scene { meshes, ..moving.clone() };
-        let standing = Oracle::new(sequence(scenario(), steady, stands)).unwrap();
+        let standing = ReferenceRenderer::new(sequence(scenario(), steady, stands)).unwrap();
         for i in 0..4000_u32 {
             let part = |k: u32, step: f64| (f64::from(i) * step + 0.1 * f64::from(k)).fract() - 0.5;
             let origin = DVec3::new(60.0 * part(1, 0.618_034), 60.0 * part(2, 0.754_878), -150.0);
             let direction = DVec3::new(part(3, 0.819_173), part(4, 0.671_044), 1.0);
             let [found, expected] =
-                [oracle.cast_at(t_s, origin, direction), standing.cast(origin, direction)];
+                [reference.cast_at(t_s, origin, direction), standing.cast(origin, direction)];
             of_surface[expected.map_or(6, |hit| hit.surface as usize)] += 1;
             match (found, expected) {
                 (Some(found), Some(expected)) => {

@@ -1,9 +1,9 @@
-//! Tracks: a ray of the oracle through the position of each, at the instant of its row, meets its point.
+//! Tracks: a ray of the reference through the position of each, at the instant of its row, meets its point.
 
 use std::{collections::BTreeSet, path::PathBuf, sync::Arc};
 
 use camsim_core::{
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{
         Channel, FieldOr, LensSpec, PointSource, Readout, Scenario, ShutterSpec, TracksSpec, ZoomSpec,
     },
@@ -83,12 +83,12 @@ fn tracked(change: impl FnOnce(&mut Scenario)) -> (Arc<Sequence>, Tracks) {
     (sequence, tracks)
 }
 
-/// Distance of a point from the oracle's ray at a sighting, and of their instants. The oracle knows the time of
+/// Distance of a point from the reference's ray at a sighting, and of their instants. The reference knows the time of
 /// each row; between two rows of a field time is linear.
-fn misses(oracle: &Oracle, frame: u64, point_ned_m: DVec3, sighting: &Sighting) -> (f64, f64) {
-    let view = oracle.view(frame);
+fn misses(reference: &ReferenceRenderer, frame: u64, point_ned_m: DVec3, sighting: &Sighting) -> (f64, f64) {
+    let view = reference.view(frame);
     let Sighting { seen, .. } = sighting;
-    let shutter = &oracle.sequence().scenario.camera.shutter;
+    let shutter = &reference.sequence().scenario.camera.shutter;
     let is_sideways = matches!(shutter.readout, Readout::LeftToRight | Readout::RightToLeft);
     // Of the nearest rows, the one whose field sees the point: a row of the other is half a period away.
     let [x, y] = seen.px.round().to_array().map(|value| value as i64);
@@ -115,7 +115,7 @@ fn misses(oracle: &Oracle, frame: u64, point_ned_m: DVec3, sighting: &Sighting) 
 }
 
 #[test]
-fn the_oracle_sees_each_point_where_its_track_is() {
+fn the_reference_sees_each_point_where_its_track_is() {
     type Change = fn(&mut Scenario);
     let shutters: [(&str, Change); 6] = [
         ("rolling", |_| ()),
@@ -136,7 +136,7 @@ fn the_oracle_sees_each_point_where_its_track_is() {
     ];
     for (name, change) in shutters {
         let (sequence, tracks) = tracked(change);
-        let oracle = Oracle::new(sequence).unwrap();
+        let reference = ReferenceRenderer::new(sequence).unwrap();
         let (mut all, mut hidden, mut unlike, mut moving) = (0, 0, 0, 0);
         for frame in 0..FRAMES {
             for sighting in tracks.sightings(frame).unwrap() {
@@ -144,10 +144,10 @@ fn the_oracle_sees_each_point_where_its_track_is() {
                 let t_s = sighting.seen.t_s;
                 let state = point.moves_with.map(|_| motion().state(t_s));
                 let now_ned_m = state.map_or(point.position_ned_m, |state| state.point(point.position_ned_m));
-                let (off, off_s) = misses(&oracle, frame, now_ned_m, &sighting);
+                let (off, off_s) = misses(&reference, frame, now_ned_m, &sighting);
                 assert!(off < 1e-8 && off_s < 1e-9, "{name}: {off:.1e}, {off_s:.1e} s: {sighting:?}");
                 let camera_ned_m = sighting.seen.pose.position_ned_m;
-                let is_hidden = oracle.is_occluded_at(t_s, camera_ned_m, now_ned_m);
+                let is_hidden = reference.is_occluded_at(t_s, camera_ned_m, now_ned_m);
                 moving += usize::from(state.is_some() && sighting.is_visible);
                 unlike += usize::from(is_hidden == sighting.is_visible);
                 hidden += usize::from(!sighting.is_visible);

@@ -6,7 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec},
     scene::{Encoding, Scene, Terrain, Texture},
     sequence::Sequence,
@@ -44,7 +44,7 @@ fn camera() -> Scenario {
     scenario.camera.focal_px = [160.0, 160.0];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
     // An ideal frame of its own with a pixel for each of the camera's, so that nothing lies between pixels;
-    // and the full surface, as the oracle has it.
+    // and the full surface, as the reference has it.
     scenario.quality.frames_per_ideal = 1;
     scenario.quality.ideal_scale = Auto::Value(1.0);
     scenario.quality.max_terrain_error_px = 1e-6;
@@ -67,10 +67,10 @@ fn at_instant(t_s: f64) -> Arc<Sequence> {
 fn reference_agrees_with_global_shutter_frames_per_row() {
     let mut rolling = camera();
     rolling.camera.shutter = ShutterSpec { delay_ms: 20.0, readout_ms: 60.0, ..ShutterSpec::default() };
-    let oracle = Oracle::new(sequence(rolling, flight(), hills())).expect("an oracle");
+    let reference = ReferenceRenderer::new(sequence(rolling, flight(), hills())).expect("a reference");
     let options =
         RenderOptions { channels: CHANNELS.to_vec(), tolerance_dn: 0.1, ..RenderOptions::default() };
-    let truth = oracle.render(0, &options);
+    let truth = reference.render(0, &options);
     let (depths, coords) = (truth.depth_m().expect("depth"), truth.coords().expect("coords"));
     let engine = engine();
     let (mut worst_point_px, mut worst_depth, mut squares, mut count) = (0.0_f64, 0.0_f64, 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! The oracle against what is known without it: closed forms, every triangle looked at, planted faults, its
+//! The reference against what is known without it: closed forms, every triangle looked at, planted faults, its
 //! own convergence.
 
 #![allow(clippy::unwrap_used)]

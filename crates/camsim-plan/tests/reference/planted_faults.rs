@@ -1,10 +1,10 @@
-//! Faults planted into the renderer's side must be seen by the comparison with the oracle; the same without a
+//! Faults planted into the renderer's side must be seen by the comparison with the reference; the same without a
 //! fault must pass.
 
 use camsim_core::{
     camera::CameraModel,
     frame::{Plane, RenderedFrame},
-    reference::{CoordErrors, Oracle, coord_errors},
+    reference::{CoordErrors, ReferenceRenderer, coord_errors},
     scenario::{Channel, Scenario},
     sequence::Sequence,
     temporal::{InverseDepthImage, KeyDepth, reproject},
@@ -82,14 +82,14 @@ fn errors(fault: Fault) -> CoordErrors {
     let sequence = sequence(camera(), Steady::moving(60.0), plane(20_000.0));
     let plan = Planner::new(sequence.clone(), &[Channel::Coords], 8192).unwrap().plan(0).unwrap();
     let frame = by_twins(&sequence, &plan, fault);
-    let oracle = Oracle::new(sequence).unwrap();
-    let errors = coord_errors(&oracle, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
+    let reference = ReferenceRenderer::new(sequence).unwrap();
+    let errors = coord_errors(&reference, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
     eprintln!("{fault:?}: {errors:?}");
     errors
 }
 
 #[test]
-fn the_twins_agree_with_the_oracle() {
+fn the_twins_agree_with_the_reference() {
     let errors = errors(Fault::None);
     // Coordinates and depths are stored in f32: half an ulp at 256 px is 1.5e-5.
     assert!(errors.smooth.max_px < 5e-5, "{errors:?}");

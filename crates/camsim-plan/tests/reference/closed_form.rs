@@ -2,7 +2,7 @@
 //! of the crate.
 
 use camsim_core::{
-    reference::{IdealView, Oracle},
+    reference::{IdealView, ReferenceRenderer},
     scenario::{FieldOr, LensSpec, Readout, Scenario, ShutterSpec},
     temporal::IdealGeometry,
 };
@@ -10,7 +10,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use crate::fixtures::{Steady, folding, plane, rolling, scenario, sequence, tangential};
 
-/// What the oracle may be off by, pixels.
+/// What the reference may be off by, pixels.
 const EXACT_PX: f64 = 1e-6;
 
 /// Camera straight below the body: its x is the right wing, its y the tail, its z the belly.
@@ -49,7 +49,7 @@ fn row_mid_s(shutter: &ShutterSpec, y: f64, rows: f64) -> f64 {
 }
 
 /// Frame 3 of a flight over the plane z = 0: the ideal rays of a grid, imaged by the formula, must be the
-/// rays that the oracle finds at those positions, meet the plane where the line of sight does, and lie in the
+/// rays that the reference finds at those positions, meet the plane where the line of sight does, and lie in the
 /// key frame where the plane's homography says.
 fn check(name: &str, scenario: &Scenario, motion: Steady, reach: f64) {
     let camera = &scenario.camera;
@@ -68,7 +68,7 @@ fn check(name: &str, scenario: &Scenario, motion: Steady, reach: f64) {
         ned_from_camera: DQuat::from_mat3(&ned_from_key),
     };
     let key = IdealView { pose: key_pose, ideal };
-    let oracle = Oracle::new(sequence(scenario.clone(), motion, plane(20_000.0))).unwrap();
+    let reference = ReferenceRenderer::new(sequence(scenario.clone(), motion, plane(20_000.0))).unwrap();
     let (mut looked, mut worst_px, mut worst_source_px) = (0, 0.0_f64, 0.0_f64);
     for i in -24_i32..=24 {
         for j in -18_i32..=18 {
@@ -82,7 +82,7 @@ fn check(name: &str, scenario: &Scenario, motion: Steady, reach: f64) {
             let t_s = stamp_s
                 + row_mid_s(&camera.shutter, pixel.y, height)
                 + phase * 1e-3 * camera.shutter.exposure_ms;
-            let look = oracle.sample(3, [pixel.x as u32, pixel.y as u32], at_px - pixel, phase).unwrap();
+            let look = reference.sample(3, [pixel.x as u32, pixel.y as u32], at_px - pixel, phase).unwrap();
             let hit = look.hit.unwrap();
 
             let (at, ned_from_camera) = pose(&motion, t_s);
@@ -149,9 +149,10 @@ fn columns_have_their_own_times() {
     for (readout, sign) in [(Readout::LeftToRight, 1.0), (Readout::RightToLeft, -1.0)] {
         let shutter = ShutterSpec { readout, interlace_ms: FieldOr::Field, ..rolling(0.0) };
         let scenario = camera(LensSpec::default(), shutter);
-        let oracle = Oracle::new(sequence(scenario, Steady::moving(150.0), plane(9000.0))).unwrap();
+        let reference =
+            ReferenceRenderer::new(sequence(scenario, Steady::moving(150.0), plane(9000.0))).unwrap();
         for [x, y] in [[0, 0], [0, 1], [639, 0], [320, 241], [17, 98]] {
-            let look = oracle.sample(2, [x, y], DVec2::ZERO, 0.0).unwrap();
+            let look = reference.sample(2, [x, y], DVec2::ZERO, 0.0).unwrap();
             let column_s = sign * 0.033 * ((f64::from(x) + 0.5) / 640.0 - 0.5) - 0.004;
             let field_s = if y % 2 == 0 { 0.5 / 30.0 } else { 0.0 };
             assert!((look.t_s - (2.0 / 30.0 + column_s - field_s)).abs() < 1e-14, "{readout:?} {x} {y}");
@@ -164,7 +165,7 @@ fn columns_have_their_own_times() {
 fn the_folding_lens_is_inverted_up_to_its_fold() {
     let scenario = camera(folding(), ShutterSpec::default());
     let k = scenario.camera.lens.coefficients.clone();
-    let oracle = Oracle::new(sequence(
+    let reference = ReferenceRenderer::new(sequence(
         scenario.clone(),
         Steady::standing(DVec3::new(0.0, 0.0, -100.0)),
         plane(90_000.0),
@@ -192,7 +193,7 @@ fn the_folding_lens_is_inverted_up_to_its_fold() {
             if !(pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < 640.0 && pixel.y < 480.0) {
                 continue;
             }
-            let look = oracle.sample(0, [pixel.x as u32, pixel.y as u32], at_px - pixel, 0.0);
+            let look = reference.sample(0, [pixel.x as u32, pixel.y as u32], at_px - pixel, 0.0);
             let found = look
                 .unwrap_or_else(|| panic!("nothing seen at {fraction} of the fold in direction {spoke}"))
                 .uv;
@@ -204,7 +205,7 @@ fn the_folding_lens_is_inverted_up_to_its_fold() {
         let pixel = far_px.round();
         if pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < 640.0 && pixel.y < 480.0 {
             assert_eq!(
-                oracle.sample(0, [pixel.x as u32, pixel.y as u32], far_px - pixel, 0.0),
+                reference.sample(0, [pixel.x as u32, pixel.y as u32], far_px - pixel, 0.0),
                 None,
                 "{spoke}"
             );

@@ -1,9 +1,9 @@
-//! Surfaces that are mixed with what is behind them: the oracle against closed forms.
+//! Surfaces that are mixed with what is behind them: the reference against closed forms.
 
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::Oracle,
+    reference::ReferenceRenderer,
     scenario::{Auto, Channel},
     scene::{Encoding, Mesh, Scene, Texture},
 };
@@ -40,14 +40,15 @@ fn over(front: DVec3, alpha: f64, behind: DVec3) -> DVec3 {
 fn looks(meshes: Vec<Mesh>, fog_visibility_m: Option<f64>) -> (DVec3, Option<f64>) {
     let sky_linear = SKY.as_vec3().to_array();
     let scene = Scene { meshes, sky_linear, fog_visibility_m, ..Scene::default() };
-    let oracle =
-        Oracle::new(sequence(scenario(), Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene)).unwrap();
+    let reference =
+        ReferenceRenderer::new(sequence(scenario(), Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene))
+            .unwrap();
     // A pixel on no edge, and one on the edge between the triangles of every square.
     let seen = [DVec2::new(0.013, 0.029), DVec2::ZERO].map(|uv| {
-        let pose = oracle.sequence().path.pose(0.0);
+        let pose = reference.sequence().path.pose(0.0);
         (
-            oracle.radiance(&pose, uv),
-            oracle.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map(|hit| hit.depth_m),
+            reference.radiance(&pose, uv),
+            reference.cast(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map(|hit| hit.depth_m),
         )
     });
     if fog_visibility_m.is_none() {

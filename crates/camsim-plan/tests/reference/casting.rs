@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use camsim_core::{reference::Oracle, scenario::LensSpec, scene::Scene};
+use camsim_core::{reference::ReferenceRenderer, scenario::LensSpec, scene::Scene};
 use glam::{DVec2, DVec3};
 
 use crate::fixtures::{Steady, folding, hills, rolling, scenario, sequence, town};
@@ -24,14 +24,15 @@ fn a_look_takes_microseconds() {
         ("terrain, folding lens", &with_lens, ground),
     ] {
         let begin = Instant::now();
-        let oracle = Oracle::new(sequence(scenario.clone(), Steady::moving(200.0), scene)).unwrap();
+        let reference =
+            ReferenceRenderer::new(sequence(scenario.clone(), Steady::moving(200.0), scene)).unwrap();
         let prepared = begin.elapsed();
         let begin = Instant::now();
         let mut hits = 0;
         for y in (0..480).step_by(4) {
             for x in (0..640).step_by(4) {
                 hits += u32::from(
-                    oracle.sample(0, [x, y], DVec2::ZERO, 0.1).is_some_and(|look| look.hit.is_some()),
+                    reference.sample(0, [x, y], DVec2::ZERO, 0.1).is_some_and(|look| look.hit.is_some()),
                 );
             }
         }
@@ -44,7 +45,8 @@ fn a_look_takes_microseconds() {
 #[test]
 fn rays_agree_with_a_look_at_every_triangle() {
     let scene = Scene { terrain: Some(hills(150, 10.0)), ..town(40) };
-    let oracle = Oracle::new(sequence(scenario(), Steady::standing(DVec3::ZERO), scene.clone())).unwrap();
+    let reference =
+        ReferenceRenderer::new(sequence(scenario(), Steady::standing(DVec3::ZERO), scene.clone())).unwrap();
     let terrain = scene.terrain.as_ref().unwrap();
     let (mut hits, mut misses) = (0, 0);
     for i in 0..4000 {
@@ -52,8 +54,8 @@ fn rays_agree_with_a_look_at_every_triangle() {
         let r = |k: usize| 2.0 * (f64::from(i) * even[k]).fract() - 1.0;
         let origin = DVec3::new(600.0 * r(0), 600.0 * r(1), -60.0 + 80.0 * r(2));
         let direction = DVec3::new(r(3), r(4), 0.3 * r(1) + 0.1);
-        let found = oracle.cast(origin, direction);
-        // The scene's own queries share no line with the oracle's.
+        let found = reference.cast(origin, direction);
+        // The scene's own queries share no line with the reference's.
         let ground = terrain.intersect(origin, direction, f64::INFINITY).map(|hit| (hit.t, hit.uv));
         let all = scene
             .meshes
@@ -80,7 +82,8 @@ fn rays_agree_with_a_look_at_every_triangle() {
 #[test]
 fn no_ray_slips_through_at_vertices_and_edges() {
     let scene = Scene { terrain: Some(hills(20, 10.0)), ..Scene::default() };
-    let oracle = Oracle::new(sequence(scenario(), Steady::standing(DVec3::ZERO), scene)).unwrap();
+    let reference =
+        ReferenceRenderer::new(sequence(scenario(), Steady::standing(DVec3::ZERO), scene)).unwrap();
     for (tilt_n, tilt_e) in [(0.0, 0.0), (0.3, -0.2), (1.0, 1.0)] {
         // Quarters of a cell: vertices, middles of edges and of diagonals.
         for i in -16..=16 {
@@ -91,7 +94,7 @@ fn no_ray_slips_through_at_vertices_and_edges() {
                     -1000.0,
                 );
                 assert!(
-                    oracle.cast(above, DVec3::new(tilt_n, tilt_e, 1.0)).is_some(),
+                    reference.cast(above, DVec3::new(tilt_n, tilt_e, 1.0)).is_some(),
                     "{i} {j} {tilt_n} {tilt_e}"
                 );
             }

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{IdealView, Oracle, RenderOptions, coord_errors, image_errors, silhouettes},
+    reference::{IdealView, ReferenceRenderer, RenderOptions, coord_errors, image_errors, silhouettes},
     scenario::{Channel, FieldOr, Preset, Scenario},
     scene::{Scene, Terrain},
 };
@@ -34,10 +34,13 @@ fn pixels_near_a_roof_are_at_a_silhouette_and_others_are_not() {
     for interlace_ms in [0.0, 20.0] {
         let mut scenario = camera();
         scenario.camera.shutter.interlace_ms = FieldOr::Ms(interlace_ms);
-        let oracle =
-            Oracle::new(sequence(scenario, Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene.clone()))
-                .unwrap();
-        let near = silhouettes(&oracle, 0, &[0.0]);
+        let reference = ReferenceRenderer::new(sequence(
+            scenario,
+            Steady::standing(DVec3::new(0.0, 0.0, -100.0)),
+            scene.clone(),
+        ))
+        .unwrap();
+        let near = silhouettes(&reference, 0, &[0.0]);
         for y in 0..120_u32 {
             for x in 0..160_u32 {
                 let from_middle =
@@ -59,19 +62,20 @@ fn fields_of_different_instants_make_no_silhouettes() {
     // Between the fields the camera turns by 4 degrees and comes 4 m nearer; the ground is a plane.
     let mut scenario = camera();
     scenario.camera.shutter.interlace_ms = FieldOr::Ms(200.0);
-    let oracle =
-        |scene: Scene| Oracle::new(sequence(scenario.clone(), Steady::moving(100.0), scene)).unwrap();
-    let on_plane = silhouettes(&oracle(plane(4000.0)), 0, &[-0.5, 0.0]);
+    let reference = |scene: Scene| {
+        ReferenceRenderer::new(sequence(scenario.clone(), Steady::moving(100.0), scene)).unwrap()
+    };
+    let on_plane = silhouettes(&reference(plane(4000.0)), 0, &[-0.5, 0.0]);
     assert!(!on_plane.contains(&true), "{}", on_plane.iter().filter(|near| **near).count());
     // Each field has the silhouettes of its own instant: those of a camera that shows both rows of a pair
     // then.
     let scene = one_block(DVec3::ZERO, 10.0, 40.0);
-    let near = silhouettes(&oracle(scene.clone()), 0, &[0.0]);
+    let near = silhouettes(&reference(scene.clone()), 0, &[0.0]);
     for (field, delay_ms) in [(0, 200.0), (1, 0.0)] {
         let mut one_field = camera();
         one_field.camera.shutter.delay_ms = delay_ms;
         let own = silhouettes(
-            &Oracle::new(sequence(one_field, Steady::moving(100.0), scene.clone())).unwrap(),
+            &ReferenceRenderer::new(sequence(one_field, Steady::moving(100.0), scene.clone())).unwrap(),
             0,
             &[0.0],
         );
@@ -99,7 +103,7 @@ fn slopes_and_creases_are_no_silhouettes_measured_or_predicted() {
     // With all of the probes.
     scenario.quality.frames_per_ideal = 1;
     let own = sequence(scenario.clone(), Steady::moving(120.0), zigzag());
-    let near = silhouettes(&Oracle::new(own.clone()).unwrap(), 0, &[0.0]);
+    let near = silhouettes(&ReferenceRenderer::new(own.clone()).unwrap(), 0, &[0.0]);
     assert!(!near.contains(&true), "{} of 4800", near.iter().filter(|near| **near).count());
     let plan = Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap();
     assert!(plan.predicted.silhouette_fraction == 0.0 && plan.predicted.probes > 400, "{:?}", plan.predicted);
@@ -107,7 +111,7 @@ fn slopes_and_creases_are_no_silhouettes_measured_or_predicted() {
     let mut walled = zigzag();
     walled.meshes.push(block(DVec3::ZERO, 15.0, 40.0));
     let own = sequence(scenario, Steady::moving(120.0), walled);
-    let near = silhouettes(&Oracle::new(own.clone()).unwrap(), 0, &[0.0]);
+    let near = silhouettes(&ReferenceRenderer::new(own.clone()).unwrap(), 0, &[0.0]);
     let measured = near.iter().filter(|near| **near).count() as f64 / 4800.0;
     let predicted =
         Planner::new(own, &[Channel::Coords], 4096).unwrap().plan(0).unwrap().predicted.silhouette_fraction;
@@ -156,13 +160,13 @@ fn what_the_key_camera_cannot_see_counts_as_a_silhouette() {
     // wall.
     let scene = one_block(DVec3::new(0.0, 30.0, 0.0), 5.0, 60.0);
     let sequence = sequence(camera(), Steady::standing(DVec3::new(0.0, 0.0, -100.0)), scene);
-    let oracle = Oracle::new(sequence.clone()).unwrap();
+    let reference = ReferenceRenderer::new(sequence.clone()).unwrap();
     let mut plan = Planner::new(sequence, &[Channel::Coords], 4096).unwrap().plan(0).unwrap();
     let at_silhouettes = |plan: &camsim_plan::FramePlan| {
         let key = Some(IdealView { pose: plan.key_pose, ideal: plan.ideal });
-        let frame = oracle
+        let frame = reference
             .render(0, &RenderOptions { channels: vec![Channel::Coords], key, ..RenderOptions::default() });
-        let errors = coord_errors(&oracle, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
+        let errors = coord_errors(&reference, plan.frame, &plan.ideal_view(), &frame, 0.0, 1).unwrap();
         assert!(errors.all.max_px < 5e-5 && errors.all.count == 160 * 120, "{errors:?}");
         errors.silhouettes.count
     };

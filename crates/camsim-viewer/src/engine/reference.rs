@@ -1,4 +1,4 @@
-//! The oracle's thread: prepares exact rays for single pixels, and renders whole frames strip by strip until
+//! The reference's thread: prepares exact rays for single pixels, and renders whole frames strip by strip until
 //! a newer request arrives.
 
 use std::{
@@ -8,14 +8,14 @@ use std::{
 
 use camsim_core::{
     frame::RenderedFrame,
-    reference::{Oracle, RenderOptions},
+    reference::{ReferenceRenderer, RenderOptions},
     scenario::Channel,
 };
 
 use super::{
     ReplySender,
     mailbox::Mailbox,
-    messages::{OraclePicture, OracleRequest, Reply},
+    messages::{ReferencePicture, ReferenceRequest, Reply},
     picture::{difference, srgb_image},
 };
 
@@ -35,7 +35,7 @@ struct PartialFrame {
 }
 
 /// Serves requests until the mailbox is closed.
-pub fn run(mailbox: &Mailbox<OracleRequest>, replies: &ReplySender) {
+pub fn run(mailbox: &Mailbox<ReferenceRequest>, replies: &ReplySender) {
     // Half of the processor cores, so that window and renderer stay responsive.
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(2);
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
@@ -46,24 +46,25 @@ pub fn run(mailbox: &Mailbox<OracleRequest>, replies: &ReplySender) {
             )));
         }
     };
-    let mut cached: Option<Arc<Oracle>> = None;
+    let mut cached: Option<Arc<ReferenceRenderer>> = None;
     let mut partial: Option<PartialFrame> = None;
     while let Some(request) = mailbox.take() {
-        let oracle = match cached.take().filter(|oracle| Arc::ptr_eq(oracle.sequence(), &request.sequence)) {
-            Some(oracle) => oracle,
-            None => match Oracle::new(request.sequence.clone()) {
-                Ok(oracle) => {
-                    partial = None;
-                    Arc::new(oracle)
-                }
-                Err(error) => {
-                    replies.send(Reply::Failed(error.to_string()));
-                    continue;
-                }
-            },
-        };
-        cached = Some(oracle.clone());
-        replies.send(Reply::Oracle(oracle.clone()));
+        let reference =
+            match cached.take().filter(|reference| Arc::ptr_eq(reference.sequence(), &request.sequence)) {
+                Some(reference) => reference,
+                None => match ReferenceRenderer::new(request.sequence.clone()) {
+                    Ok(reference) => {
+                        partial = None;
+                        Arc::new(reference)
+                    }
+                    Err(error) => {
+                        replies.send(Reply::Failed(error.to_string()));
+                        continue;
+                    }
+                },
+            };
+        cached = Some(reference.clone());
+        replies.send(Reply::Reference(reference.clone()));
         let Some(frame) = request.frame else { continue };
         let [width, height] = request.sequence.scenario.camera.size_px.map(|side| side as usize);
         let empty = || PartialFrame { frame, color_rgba: vec![0.0; 4 * width * height], rows: 0 };
@@ -71,43 +72,43 @@ pub fn run(mailbox: &Mailbox<OracleRequest>, replies: &ReplySender) {
         if partial.frame != frame {
             *partial = empty();
         }
-        pool.install(|| render_rows(&oracle, &request, partial, mailbox, replies));
+        pool.install(|| render_rows(&reference, &request, partial, mailbox, replies));
     }
 }
 
 /// The picture of the rows so far. Where light spreads, rows show what comes in, until all are there.
-fn shown(oracle: &Oracle, partial: &PartialFrame, size_px: [u32; 2]) -> Vec<f32> {
+fn shown(reference: &ReferenceRenderer, partial: &PartialFrame, size_px: [u32; 2]) -> Vec<f32> {
     let color_rgba = partial.color_rgba.clone();
-    if !oracle.spreads_light() || partial.rows < size_px[1] as usize {
+    if !reference.spreads_light() || partial.rows < size_px[1] as usize {
         return color_rgba;
     }
     let picture = RenderedFrame::picture(size_px, color_rgba);
     let mut whole = RenderedFrame { index: partial.frame, ..picture };
-    oracle.expose(&mut whole);
+    reference.expose(&mut whole);
     whole.into_color()
 }
 
 /// Renders the missing rows from the top, until a newer request arrives.
 fn render_rows(
-    oracle: &Oracle,
-    request: &OracleRequest,
+    reference: &ReferenceRenderer,
+    request: &ReferenceRequest,
     partial: &mut PartialFrame,
-    mailbox: &Mailbox<OracleRequest>,
+    mailbox: &Mailbox<ReferenceRequest>,
     replies: &ReplySender,
 ) {
     let scenario = &request.sequence.scenario;
     let size_px = scenario.camera.size_px;
     let [width, height] = size_px.map(|side| side as usize);
     let send = |partial: &PartialFrame| {
-        let color_rgba = shown(oracle, partial, size_px);
-        let is_comparable = partial.rows == height || !oracle.spreads_light();
+        let color_rgba = shown(reference, partial, size_px);
+        let is_comparable = partial.rows == height || !reference.spreads_light();
         let difference = request.against.as_ref().filter(|_| is_comparable).and_then(|(picture, gain)| {
             let against = &picture.frame;
             (against.size_px == size_px)
                 .then(|| difference(size_px, against.color_rgba(), &color_rgba, *gain, partial.rows as u32))
                 .flatten()
         });
-        replies.send(Reply::OraclePicture(Box::new(OraclePicture {
+        replies.send(Reply::ReferencePicture(Box::new(ReferencePicture {
             sequence: request.sequence.clone(),
             frame: partial.frame,
             image: Arc::new(srgb_image(size_px, &color_rgba)),
@@ -130,7 +131,7 @@ fn render_rows(
             only: Some((0..width * height).map(|pixel| rows.contains(&(pixel / width))).collect()),
             ..RenderOptions::default()
         };
-        let strip = oracle.render(partial.frame, &options);
+        let strip = reference.render(partial.frame, &options);
         let range = 4 * width * rows.start..4 * width * rows.end;
         if let (Some(to), Some(from)) =
             (partial.color_rgba.get_mut(range.clone()), strip.color_rgba().get(range))

@@ -1,10 +1,10 @@
-//! What no ideal frame sees: predicted from a few hundred probes, counted by the oracle, and the ideal frames
+//! What no ideal frame sees: predicted from a few hundred probes, counted by the reference, and the ideal frames
 //! that are taken for it.
 
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{Oracle, disocclusion},
+    reference::{ReferenceRenderer, disocclusion},
     scenario::{Auto, Channel, Scenario, ShutterSpec, Silhouettes},
     scene::Scene,
     sequence::Sequence,
@@ -44,7 +44,8 @@ fn with(sequence: &Arc<Sequence>, edit: impl Fn(&mut Scenario)) -> Arc<Sequence>
 /// Over the exposure as the probes look.
 fn counted(sequence: &Arc<Sequence>, plan: &FramePlan) -> f64 {
     let phases: &[f64] = if plan.blur.is_some() { &[-0.5, 0.0, 0.5] } else { &[0.0] };
-    disocclusion(&Oracle::new(sequence.clone()).unwrap(), plan.frame, &plan.key_poses(), phases).fraction()
+    disocclusion(&ReferenceRenderer::new(sequence.clone()).unwrap(), plan.frame, &plan.key_poses(), phases)
+        .fraction()
 }
 
 fn house() -> Scene {
@@ -67,7 +68,7 @@ fn town() -> Scene {
 }
 
 #[test]
-fn predicted_disocclusion_is_what_the_oracle_counts() {
+fn predicted_disocclusion_is_what_the_reference_counts() {
     for (name, sequence) in [
         ("a house", sequence(camera(400.0, 0.0), flight(50.0), house())),
         ("a house, blurred", sequence(camera(200.0, 200.0), flight(50.0), house())),
