@@ -1,11 +1,30 @@
 #!/bin/sh
 # Installs what is missing, then checks formatting and lints and runs every test; needs only a clone of the repository and Rust.
+#   --quick            formatting, and the tests that need no graphics adapter: planner, cpu renderer, files, command line
 #   CAMSIM_DATA=DIR    also runs the tests on real flights, terrains and calibrations, which are not in the repository
 #   CAMSIM_SKIP_JUDGES=1  leaves out scripts/judges.sh, which downloads Python packages
 #   CAMSIM_SKIP_GPU=1  ignores the tests that need a graphics adapter; without it they fail on a machine that has none
 set -eu
 cd "$(dirname "$0")/.."
 . scripts/setup.sh
+
+case ${1:-} in
+--quick)
+    setup_cargo
+    say "formatting"
+    cargo fmt --all --check
+    say "tests without a graphics adapter"
+    cargo test --no-default-features --lib --bins --tests \
+        -p camsim-scenario -p camsim-core -p camsim-plan -p camsim-cpu -p camsim-io -p camsim-cli
+    say "passed; not run: lints, examples, tests of engine, gpu, viewer, experiments and Python, readers of other programs"
+    exit
+    ;;
+"") ;;
+*)
+    say "unknown option $1: sh scripts/test.sh [--quick]"
+    exit 2
+    ;;
+esac
 
 setup
 # Without a desktop session Mesa prints an error for every adapter opened; camsim itself does without that layer.
