@@ -1,6 +1,5 @@
 #!/bin/sh
-# Makes the pictures at the head of the guides APPLY, BOARDS, CAMERA_FILES, EXPORT, LONG_RUNS, OBJECTS, PYTHON, RANDOMIZE, RIGS,
-# SENSORS and TRACKS, and of the reference CHANNELS:
+# Makes the pictures of docs/GALLERY.md, and those at the head of the guides EXPORT, LONG_RUNS, OBJECTS, PYTHON and SENSORS:
 #   sh scripts/pictures.sh target/release/camsim
 # Needs a built camsim, and Python with numpy, matplotlib, Pillow and OpenEXR (PYTHON=... names the interpreter). Everything shown is
 # in the repository: the demo's flight, a village on the demo's terrain, or a board.
@@ -37,6 +36,14 @@ done
 # CHANNELS, OBJECTS: a village with a lorry and two cars.
 "$camsim" render village.toml -o village --frames 40 --set output.palette=true --sheet -q \
     --outputs color,depth,range,normal,normal_world,object,coverage,flow,flow_back,flow_global,motion,blur_path
+
+# Pairs of the GALLERY: a perfect camera, a global shutter, a scene without shadows.
+"$camsim" render "$demo" -o demo --frames 60 --format png -q --set 'output.twin=[{name="perfect",ideal=true}]'
+"$camsim" render "$repository/examples/propeller/propeller.toml" -o propeller --frames 2 -q
+for shadows in false true; do
+    "$camsim" render "$demo" -o "shadows_$shadows" --frames 60 --format png -q \
+        --set "scene.light={sun_azimuth_deg=265,sun_elevation_deg=16,shadows=$shadows}"
+done
 
 # EXPORT: a model of COLMAP.
 "$camsim" export "$demo" --as colmap -o colmap --frames 0,16,32,48,64,80,96,112 --set 'output.tracks={points="terrain",count=2000}' -q

@@ -68,6 +68,24 @@ def save(figure, name):
     print(path, path.stat().st_size // 1024, "KiB")
 
 
+def pair(name, left, right):
+    """Two pictures side by side, pixel by pixel."""
+    left, right = picture(left), picture(right)
+    both = Image.new("RGB", (2 * left.width + 8, left.height), "white")
+    both.paste(left, (0, 0))
+    both.paste(right, (left.width + 8, 0))
+    path = PICTURES / f"{name}.png"
+    both.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=3).save(path, optimize=True)
+    print(path, path.stat().st_size // 1024, "KiB")
+
+
+def pairs():
+    frame = "color/frame_000060.png"
+    pair("demo", f"demo/perfect/{frame}", f"demo/{frame}")
+    pair("shadows", f"shadows_false/{frame}", f"shadows_true/{frame}")
+    pair("propeller", "propeller/color/frame_000002.png", "propeller/global/color/frame_000002.png")
+
+
 def show_depth(axis, path):
     depth = planes(path)["Z"]
     axis.imshow(np.where(depth > 0, depth, np.nan), cmap="turbo_r", norm="log")
@@ -391,6 +409,7 @@ for draw in (
     board,
     camera_files,
     channels,
+    pairs,
     export,
     long_runs,
     objects,
