@@ -91,7 +91,7 @@ pub use timing::{TIMING_CSV, timing_csv};
 pub use tracks::{POINTS_CSV, TRACKS_CSV, TrackFiles, points_csv, tracks_rows};
 pub(crate) use tracks::{PointRecord, TrackRecord};
 pub use variations::{VARIATIONS_CSV, VariationsError, variation_folder, write_variations};
-pub use video::Y4mStream;
+pub use video::{Y4mStream, has_ffmpeg};
 
 /// Why a file was not written.
 #[derive(Debug, Error)]

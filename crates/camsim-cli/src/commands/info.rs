@@ -1,11 +1,12 @@
 //! `camsim info`.
 
 use camsim_engine::{AdapterChoice, AdapterSummary, Engine, adapters};
+use camsim_io::write::has_ffmpeg;
 use serde::Serialize;
 
 use crate::{backend::BackendArgs, console::Console, failure::Failure};
 
-/// Show what renders: graphics adapters with driver and limits, the processor, and which is used
+/// Show what renders, what works on this machine, and what each lack means
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. A software adapter (Mesa's llvmpipe) \
@@ -33,6 +34,54 @@ struct Info {
     cpu_threads: usize,
     /// Whether the processor has the vector instructions that make the cpu renderer fast.
     cpu_vectors: bool,
+    parts: Vec<Part>,
+}
+
+/// Something that a machine or a build may lack.
+#[derive(Serialize)]
+struct Part {
+    name: &'static str,
+    here: bool,
+    /// What its lack means.
+    without: &'static str,
+}
+
+/// What there is, and what each lack means.
+fn parts(engine: &Engine) -> Vec<Part> {
+    let part = |name, here, without| Part { name, here, without };
+    let mut parts = vec![
+        part(
+            "graphics card",
+            engine.adapter().is_some_and(|adapter| !adapter.limits().is_software),
+            "the processor renders, at a fraction of the rate",
+        ),
+        part(
+            "Vulkan, Metal or DX12",
+            engine.adapter().is_some(),
+            "--backend gpu and `camsim viewer` do not work; what the cpu renderer does not vectorise is computed in f64",
+        ),
+        part(
+            "vector instructions",
+            engine.capabilities().has_vectors,
+            "the cpu renderer is several times slower (x86-64 needs AVX2, FMA and F16C)",
+        ),
+        part("ffmpeg", has_ffmpeg(), "no mp4 and mkv; exr, png and y4m need nothing"),
+        part("viewer", cfg!(feature = "viewer"), "no `camsim viewer`; build with --features viewer"),
+    ];
+    if cfg!(all(feature = "viewer", target_os = "linux")) {
+        let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
+        parts.push(part(
+            "display",
+            has_display,
+            "`camsim viewer` cannot open a window (DISPLAY, WAYLAND_DISPLAY)",
+        ));
+    }
+    parts.push(part(
+        "experiments",
+        cfg!(feature = "lab"),
+        "no `camsim study`, `bench` and `reproduce`; build with --features lab",
+    ));
+    parts
 }
 
 #[derive(Serialize)]
@@ -71,8 +120,13 @@ pub fn run(args: &InfoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         console.line(format_args!("largest side  {side_px} px"))?;
         console.line(format_args!("largest table {} MiB", bytes >> 20))?;
     }
-    let vectors = if info.cpu_vectors { "with" } else { "without" };
-    console.line(format_args!("processors    {}, {vectors} vector instructions", info.cpu_threads))?;
+    console.line(format_args!("processors    {}", info.cpu_threads))?;
+    let (here, lacking): (Vec<&Part>, Vec<&Part>) = info.parts.iter().partition(|part| part.here);
+    let names: Vec<&str> = here.iter().map(|part| part.name).collect();
+    console.line(format_args!("works here    {}", names.join(", ")))?;
+    for part in lacking {
+        console.line(format_args!("lacks         {}: {}", part.name, part.without))?;
+    }
     Ok(())
 }
 
@@ -87,5 +141,6 @@ fn info(engine: &Engine) -> Info {
         max_storage_buffer_bytes: limits.map(|limits| limits.max_storage_bytes),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
         cpu_vectors: engine.capabilities().has_vectors,
+        parts: parts(engine),
     }
 }

@@ -29,6 +29,7 @@ mod tests;
 mod y4m;
 
 use ffmpeg::Ffmpeg;
+pub use ffmpeg::has_ffmpeg;
 pub use y4m::Y4mStream;
 
 /// What a video shows.

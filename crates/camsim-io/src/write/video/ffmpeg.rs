@@ -17,18 +17,25 @@ use camsim_core::{
 use super::{Series, pixels, rate};
 use crate::write::WriteError;
 
+/// Whether there is an ffmpeg on the PATH, which `mp4` and `mkv` need.
+#[must_use]
+pub fn has_ffmpeg() -> bool {
+    let found = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).output();
+    found.is_ok_and(|output| output.status.success())
+}
+
 /// Checks that there is an ffmpeg. `path` is for messages only.
 pub(super) fn find(path: &Path) -> Result<(), WriteError> {
-    let found = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).output();
-    match found {
-        Ok(output) if output.status.success() => Ok(()),
-        _ => Err(WriteError::Encode {
-            path: path.into(),
-            message: "it needs the program ffmpeg, which is not on the PATH: install it (Debian, Ubuntu: apt install \
-                      ffmpeg; macOS: brew install ffmpeg), or choose the format y4m or png"
-                .into(),
-        }),
+    if has_ffmpeg() {
+        return Ok(());
     }
+    Err(WriteError::Encode {
+        path: path.into(),
+        message:
+            "it needs the program ffmpeg, which is not on the PATH: install it (Debian, Ubuntu: apt install \
+                  ffmpeg; macOS: brew install ffmpeg), or choose the format y4m or png"
+                .into(),
+    })
 }
 
 /// A running ffmpeg.
