@@ -51,6 +51,15 @@ judge pictures "$dir/gs/run"
 judge settings "$dir/stereo/run"
 camsim schema -o "$dir/scenario.schema.json"
 camsim -q render --print-default > "$dir/default.toml"
+say "studies: camsim's algorithms"
+camsim -q new "$dir/board/flight.toml" --for calibration >/dev/null
+sed "s|^scenario = .*|scenario = \"board/flight.toml\"|; s|^frames = .*|set = { \"camera.fps\" = 2 }|" scripts/judges/study.toml >"$dir/calibration.toml"
+for algorithm in tracking flow pnp calibration mapping; do
+    study=scripts/judges/study.toml
+    [ $algorithm = calibration ] && study=$dir/calibration.toml
+    camsim -q study "$study" --algorithm $algorithm -o "$dir/study-$algorithm" --python "$(realpath "$venv")/bin/python" >/dev/null
+done
+judge study "$dir"
 judge schema "$dir/scenario.schema.json" "$dir/default.toml" "$dir/gs.toml" assets/demo.toml examples/propeller/propeller.toml
 calib="$dir/calibrations"
 "$venv/bin/python" scripts/judges/calibrations.py make "$calib"

@@ -20,6 +20,8 @@ pub mod render;
 #[cfg(feature = "lab")]
 pub mod reproduce;
 pub mod schema;
+#[cfg(feature = "lab")]
+pub mod study;
 pub mod track;
 pub mod verify;
 #[cfg(feature = "viewer")]

@@ -42,10 +42,16 @@ impl Failure {
     /// Says of which variation it is; an interruption says so itself.
     #[must_use]
     pub fn of_variation(self, index: u64) -> Self {
+        self.of(format_args!("variation {index}"))
+    }
+
+    /// Says what it is of; an interruption says so itself.
+    #[must_use]
+    pub fn of(self, what: impl fmt::Display) -> Self {
         if self.code == INTERRUPTED {
             return self;
         }
-        let text = format!("variation {index}: {}", self.error);
+        let text = format!("{what}: {}", self.error);
         Self { code: self.code, error: self.error.context(text) }
     }
 

@@ -108,6 +108,8 @@ enum Command {
     Bench(commands::bench::BenchArgs),
     #[cfg(feature = "lab")]
     Reproduce(commands::reproduce::ReproduceArgs),
+    #[cfg(feature = "lab")]
+    Study(commands::study::StudyArgs),
     Info(commands::info::InfoArgs),
     #[cfg(feature = "viewer")]
     Viewer(commands::viewer::ViewerArgs),
@@ -161,6 +163,8 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Bench(args) => commands::bench::run(&args, console),
         #[cfg(feature = "lab")]
         Command::Reproduce(args) => commands::reproduce::run(&args, console),
+        #[cfg(feature = "lab")]
+        Command::Study(args) => commands::study::run(&args, console),
         Command::Info(args) => commands::info::run(&args, console),
         #[cfg(feature = "viewer")]
         Command::Viewer(args) => commands::viewer::run(&args),
@@ -195,7 +199,7 @@ fn report_clap(error: &clap::Error, console: &mut Console<'_>) -> u8 {
 fn left_out(error: &clap::Error) -> Option<&'static str> {
     let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand) else { return None };
     match name.as_str() {
-        "bench" | "reproduce" => Some("lab"),
+        "bench" | "reproduce" | "study" => Some("lab"),
         "viewer" => Some("viewer"),
         _ => None,
     }

@@ -16,10 +16,12 @@
 //! * [`cases`]: scenes and motions in memory.
 //! * [`reproduce`]: the experiments of section 8 of the paper (`camsim reproduce`).
 //! * [`plot`]: line plots as SVG.
+//! * [`study`]: a command on the frames of many scenarios (`camsim study`).
 //! * [`timing`]: processor time, memory, quantiles.
 
 pub mod bench;
 pub mod cases;
 pub mod plot;
 pub mod reproduce;
+pub mod study;
 pub mod timing;

@@ -16,12 +16,14 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Whether points are joined by a line.
     pub joined: bool,
+    /// Vertical bars (x, low, high).
+    pub bars: Vec<(f64, f64, f64)>,
 }
 
 impl Series {
     /// Points that are joined by a line.
     pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.into(), points, joined: true }
+        Self { name: name.into(), points, joined: true, bars: Vec::new() }
     }
 
     /// Single points.
@@ -88,12 +90,24 @@ impl Plot {
 
     /// Points that are within the axes.
     fn shown<'a>(&'a self, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
-        let is_shown = |value: f64, log: bool| value.is_finite() && (!log || value > 0.0);
-        series
-            .points
-            .iter()
-            .copied()
-            .filter(move |&(x, y)| is_shown(x, self.log[0]) && is_shown(y, self.log[1]))
+        series.points.iter().copied().filter(move |&(x, y)| self.is_on(0, x) && self.is_on(1, y))
+    }
+
+    /// Whether a value has a place on an axis.
+    fn is_on(&self, axis: usize, value: f64) -> bool {
+        value.is_finite() && (!self.log[axis] || value > 0.0)
+    }
+
+    /// The ends of bars that are within the axes.
+    fn ends<'a>(&'a self, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
+        self.shown_bars(series).flat_map(|(x, low, high)| [(x, low), (x, high)])
+    }
+
+    /// Bars that are within the axes.
+    fn shown_bars<'a>(&'a self, series: &'a Series) -> impl Iterator<Item = (f64, f64, f64)> + 'a {
+        let is_shown =
+            |&(x, low, high): &(f64, f64, f64)| self.is_on(0, x) && self.is_on(1, low) && self.is_on(1, high);
+        series.bars.iter().copied().filter(is_shown)
     }
 
     /// Smallest and largest value of an axis, with a margin.
@@ -101,7 +115,7 @@ impl Plot {
         let values = self
             .series
             .iter()
-            .flat_map(|series| self.shown(series))
+            .flat_map(|series| self.shown(series).chain(self.ends(series)))
             .map(|(x, y)| if axis == 0 { x } else { y });
         let (low, high) = values
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
@@ -194,6 +208,8 @@ impl Plot {
                     .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))
                     .map_err(message)?;
             }
+            let bar = |(x, low, high)| PathElement::new(vec![(x, low), (x, high)], color.stroke_width(1));
+            chart.draw_series(self.shown_bars(series).map(bar)).map_err(message)?;
             chart
                 .draw_series(points.iter().map(|&point| Circle::new(point, 3, color.filled())))
                 .map_err(message)?

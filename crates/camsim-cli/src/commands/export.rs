@@ -68,6 +68,32 @@ pub struct ExportArgs {
     depth_per_metre: Option<f64>,
 }
 
+#[cfg(feature = "lab")]
+impl ExportArgs {
+    /// A scenario's frames in a layout.
+    pub fn of_scenario(
+        source: PathBuf,
+        format: DatasetFormat,
+        output: PathBuf,
+        frames: Option<FrameList>,
+        changes: Changes,
+        backend: Option<RenderBackend>,
+    ) -> Self {
+        Self {
+            source,
+            format,
+            output,
+            frames,
+            changes,
+            backend,
+            camera: Vec::new(),
+            color: false,
+            variation: None,
+            depth_per_metre: None,
+        }
+    }
+}
+
 fn format_parser() -> impl TypedValueParser<Value = DatasetFormat> {
     PossibleValuesParser::new(DatasetFormat::NAMES)
         .try_map(|name| DatasetFormat::named(&name).ok_or_else(|| format!("`{name}` is not a layout")))

@@ -131,6 +131,22 @@ impl RenderBackend {
 }
 
 impl RenderArgs {
+    /// What is missing of a scenario's frames in a folder.
+    #[cfg(feature = "lab")]
+    pub fn of_scenario(
+        scenario: PathBuf,
+        output: PathBuf,
+        frames: Option<FrameList>,
+        changes: Changes,
+        backend: Option<RenderBackend>,
+    ) -> Self {
+        Self {
+            scenario: Some(scenario),
+            output: Some(output),
+            ..Self::for_export(frames, Vec::new(), changes, backend)
+        }
+    }
+
     /// What `camsim export` renders: what is missing in its folder.
     pub fn for_export(
         frames: Option<FrameList>,
