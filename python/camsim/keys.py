@@ -22,7 +22,7 @@ Keys = TypedDict(
         "flight.angles": Literal["auto", "wrapped", "continuous"] | None,
         "flight.attitude": Literal["log", "track"] | None,
         "flight.origin": Sequence[float] | Literal["first"] | None,
-        "flight.height": Literal["ellipsoid", "msl"] | None,
+        "flight.height": Literal["ellipsoid", "msl", "ground", "takeoff"] | None,
         "flight.height_from": Literal["auto", "gnss", "pressure"] | None,
         "flight.topic": str | None,
         "flight.window_s": Sequence[float] | None,

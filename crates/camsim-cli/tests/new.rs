@@ -69,6 +69,29 @@ fn files_are_named_from_the_scenarios_folder_on() {
 }
 
 #[test]
+fn a_log_of_heights_above_take_off_needs_its_terrain_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(assets().join("demo_flight.csv")).unwrap();
+    // The ground below the first row is 3117 m above the sea, which the DEM says.
+    let relative = text.lines().map(|line| match line.split(',').collect::<Vec<_>>()[..] {
+        [t_s, lat, lon, height, ref attitude @ ..] if height != "height_m" => {
+            let up_m = height.parse::<f64>().unwrap() - 3117.0;
+            format!("{t_s},{lat},{lon},{up_m:.2},{}\n", attitude.join(","))
+        }
+        _ => line.replace("height_m", "height_above_takeoff(m)") + "\n",
+    });
+    let log = folder.path().join("dji.csv");
+    fs::write(&log, relative.collect::<String>()).unwrap();
+    let scenario = folder.path().join("flight.toml");
+    let (log, scenario) = (log.to_str().unwrap(), scenario.to_str().unwrap());
+    let (code, _, err) = camsim(&["new", scenario, "--log", log]);
+    assert!(code == 2 && err.contains("set flight.height = \"takeoff\""), "{err}");
+    fs::remove_file(scenario).unwrap();
+    let (code, out, err) = camsim(&["new", scenario, "--log", log, "--height", "takeoff"]);
+    assert!(code == 0 && out.contains("m above ground"), "{out}{err}");
+}
+
+#[test]
 fn what_cannot_be_is_refused_before_a_file_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = folder.path().join("new/flight.toml");

@@ -7,8 +7,8 @@
 //! 1. Rows without a usable time or position are dropped; unusable attitudes are marked as missing.
 //! 2. Rows are sorted by time (stable sort); zeros that stand for a missing fix or height are dropped
 //!    (`null_rows`).
-//! 3. Heights change datum, positions become local NED, angles become rotations, or stay angles if they count
-//!    turns.
+//! 3. Heights change datum or are added to those of the ground, positions become local NED, angles become
+//!    rotations, or stay angles if they count turns.
 //! 4. Position spikes are dropped, attitude glitches are marked as missing (`outliers`).
 //! 5. Rows less than 1 ms apart are averaged into one.
 //! 6. Missing attitudes are interpolated between their neighbours, or all are computed from the track
@@ -16,6 +16,8 @@
 //! 7. Time is scaled, gaps are counted, and rows are inserted where the angles between two rows change by
 //!    more than 90 degrees.
 //!    between.
+
+use std::fmt;
 
 use glam::{DQuat, DVec3};
 
@@ -80,10 +82,13 @@ pub struct LogRow {
     pub ned_from_body: DQuat,
 }
 
-/// Change of vertical datum while a log is read. None is needed if log and terrain share a datum; the caller
+/// Height of the ground at a position, whose own height does not count, metres; `None` where it is not known.
+pub type GroundHeight<'a> = &'a dyn Fn(Geodetic) -> Option<f64>;
+
+/// Conversion of heights while a log is read. None is needed if log and terrain share a datum; the caller
 /// decides.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum HeightConversion {
+#[derive(Clone, Copy, Default)]
+pub enum HeightConversion<'a> {
     /// Heights stay as they are.
     #[default]
     None,
@@ -91,11 +96,27 @@ pub enum HeightConversion {
     MslToEllipsoid,
     /// Heights above the ellipsoid become heights above mean sea level (EGM96).
     EllipsoidToMsl,
+    /// Heights above the ground below each row. Where that is not known, the ground of the row before counts.
+    AboveGround(GroundHeight<'a>),
+    /// Heights above the ground below the first good row.
+    AboveTakeoff(GroundHeight<'a>),
+}
+
+impl fmt::Debug for HeightConversion<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "None",
+            Self::MslToEllipsoid => "MslToEllipsoid",
+            Self::EllipsoidToMsl => "EllipsoidToMsl",
+            Self::AboveGround(_) => "AboveGround",
+            Self::AboveTakeoff(_) => "AboveTakeoff",
+        })
+    }
 }
 
 /// Options for turning raw rows into a log.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LogOptions {
+#[derive(Clone, Copy, Debug)]
+pub struct LogOptions<'a> {
     /// Whether angles wrap or count turns.
     pub angles: AngleKind,
     /// Source of the attitude.
@@ -104,13 +125,14 @@ pub struct LogOptions {
     /// origin is in the datum *after* `height`. For a log in local coordinates, it is the geodetic position
     /// of (0, 0, 0).
     pub origin: Option<Geodetic>,
-    /// Change of vertical datum of geodetic rows.
-    pub height: HeightConversion,
+    /// Conversion of the heights of geodetic rows. Those above the ground also convert local rows, if there is an
+    /// `origin`.
+    pub height: HeightConversion<'a>,
     /// Time scale: 2 flies the log twice as fast. Positive.
     pub speed: f64,
 }
 
-impl Default for LogOptions {
+impl Default for LogOptions<'_> {
     fn default() -> Self {
         Self {
             angles: AngleKind::Auto,
@@ -122,9 +144,9 @@ impl Default for LogOptions {
     }
 }
 
-impl LogOptions {
+impl<'a> LogOptions<'a> {
     /// The options of a scenario's `[flight]`.
-    pub fn from_spec(spec: &FlightSpec, height: HeightConversion) -> Self {
+    pub fn from_spec(spec: &FlightSpec, height: HeightConversion<'a>) -> Self {
         let origin = match spec.origin {
             Origin::First => None,
             Origin::Geodetic([lat_deg, lon_deg, height_m]) => {
@@ -177,6 +199,14 @@ pub enum LogError {
         /// First line of the other kind.
         line: usize,
     },
+    /// Heights are above the ground, which is not known.
+    #[error(
+        "line {line}: heights are above the ground, but the terrain has no height there: use a terrain below the flight"
+    )]
+    NoGround {
+        /// Line of the first good row.
+        line: usize,
+    },
     /// `flight.speed` is not usable.
     #[error("flight.speed = {0} must be a positive finite number")]
     BadSpeed(f64),
@@ -215,7 +245,7 @@ impl FlightLog {
     ///
     /// # Errors
     /// [`LogError`]: nothing usable in the rows, or unusable options.
-    pub fn from_raw(raw: &[RawRow], options: &LogOptions) -> Result<Self, LogError> {
+    pub fn from_raw(raw: &[RawRow], options: &LogOptions<'_>) -> Result<Self, LogError> {
         clean::clean(raw, options)
     }
 }

@@ -2,11 +2,11 @@
 //! its own row, from the trajectory into the scene. It is slow, exact and independent of the other renderers.
 //!
 //! It shares with them the scenario, the trajectory (with the mount), the motions of what moves, the forward
-//! model of the lens, and what docs/accuracy/reference.md lists. Row times (`timing`), lens inverse (`lens_inverse`), zoom, ray casting (`ray`,
-//! `terrain_pyramid`, `mesh_bvh`, `moving`), shadows (`shadow`), colour (`shading`) and integration (`render`)
-//! are implementations of its own. The seeded photometric stage is shared, because a seed has no meaning
-//! other than its noise. The definition of a silhouette ([`crate::silhouette`]) is shared, too, by these
-//! measurements and by the predictions of the planner.
+//! model of the lens, and what docs/accuracy/reference.md lists. Row times (`timing`), lens inverse
+//! (`lens_inverse`), zoom, ray casting (`ray`, `terrain_pyramid`, `mesh_bvh`, `moving`), shadows (`shadow`), colour
+//! (`shading`) and integration (`render`) are implementations of its own. The seeded photometric stage is shared,
+//! because a seed has no meaning other than its noise. The definition of a silhouette ([`crate::silhouette`]) is
+//! shared, too, by these measurements and by the predictions of the planner.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -168,7 +168,7 @@ pub fn span_s(scenario: &Scenario, last_row_s: f64) -> [f64; 2] {
 /// The vertical datum of the local frame's heights, after the conversions that loading makes.
 #[must_use]
 pub fn frame_heights(scenario: &Scenario) -> HeightReference {
-    let log = scenario.flight.height;
+    let log = scenario.log_datum();
     let terrain = scenario.scene.terrain.as_ref().map_or(log, |terrain| terrain.height);
     // Equal datums need no conversion; of two, heights above mean sea level become ellipsoidal.
     if log == terrain { log } else { HeightReference::Ellipsoid }

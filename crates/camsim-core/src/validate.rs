@@ -88,6 +88,12 @@ fn check_flight(check: &mut Check, scenario: &Scenario) {
     check.require(!flight.log.as_os_str().is_empty(), "flight.log", || {
         "is empty; give the path of the flight log".into()
     });
+    check.require(flight.height.datum().is_some() || scenario.scene.terrain.is_some(), "flight.height", || {
+        format!(
+            "is \"{}\", above the ground of scene.terrain: add [scene.terrain], or write \"msl\" or \"ellipsoid\"",
+            flight.height.name()
+        )
+    });
     if let Some([from, to]) = flight.window_s {
         check.require(from.is_finite() && to.is_finite() && from < to, "flight.window_s", || {
             format!(

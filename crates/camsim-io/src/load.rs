@@ -9,16 +9,17 @@ use crate::{
     kernel_file::{KernelFileError, load_kernel},
     lens_table::{LensTableError, load_lens_table},
     raster::pictures::{PictureError, read_vignette},
-    raster::{TerrainFileError, TerrainSummary},
+    raster::{Ground, TerrainFileError, TerrainSummary},
 };
 use camsim_core::{
     auto_exposure::{ExposureError, ExposureTrack},
     flight_log::{FlightLog, HeightConversion},
+    geodesy::Geodetic,
     mount::{CameraPath, MountError},
     resized::delivered,
     scenario::{
-        Auto, CameraSpec, Channel, FieldOr, FlightSpec, HeightReference, PlaneKind, Problem, Rig, Scenario,
-        TrackerKind,
+        Auto, CameraSpec, Channel, FieldOr, FlightHeight, FlightSpec, HeightReference, PlaneKind, Problem,
+        Rig, Scenario, TrackerKind,
     },
     sensors::{SensorError, Sensors},
     sequence::Sequence,
@@ -322,7 +323,7 @@ fn load_or_reuse(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded,
     let sensors = load_sensors(scenario, &log, trajectory)?;
     let has_same_scene = |before: &Loaded, old: &Scenario| {
         old.scene == scenario.scene
-            && old.flight.height == scenario.flight.height
+            && old.log_datum() == scenario.log_datum()
             && before.log.frame == log.frame
             && (!has_pose_table(scenario)
                 || (before.log.epoch_ns == log.epoch_ns && old.flight.speed == scenario.flight.speed))
@@ -403,7 +404,8 @@ fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
     let without_window = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
     without_window(&a.flight) == without_window(&b.flight)
         && a.effective_tracker() == b.effective_tracker()
-        && height_conversions(a).0 == height_conversions(b).0
+        && raises_log(a) == raises_log(b)
+        && (a.flight.height.datum().is_some() || a.scene.terrain == b.scene.terrain)
 }
 
 /// Reads and tracks the log alone, without the scene.
@@ -411,22 +413,44 @@ fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
 /// # Errors
 /// As [`load_sequence`].
 pub fn load_flight(scenario: &Scenario) -> Result<(FlightLog, TrackResult), LoadError> {
-    let (log_height, _) = height_conversions(scenario);
-    let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
+    let log = read_log(scenario)?;
     let tracked = track(&log.rows, &scenario.effective_tracker())?;
     Ok((log, tracked))
 }
 
-/// How heights of the log are converted, and whether those of the terrain are raised by the geoid. Equal
-/// vertical datums need neither; else heights above mean sea level become ellipsoidal.
-fn height_conversions(scenario: &Scenario) -> (HeightConversion, bool) {
-    let log = scenario.flight.height;
-    let terrain = scenario.scene.terrain.as_ref().map_or(log, |terrain| terrain.height);
-    match (log, terrain) {
-        (HeightReference::Msl, HeightReference::Ellipsoid) => (HeightConversion::MslToEllipsoid, false),
-        (HeightReference::Ellipsoid, HeightReference::Msl) => (HeightConversion::None, true),
-        _ => (HeightConversion::None, false),
+fn read_log(scenario: &Scenario) -> Result<FlightLog, LoadError> {
+    let flight = &scenario.flight;
+    let read = |height: HeightConversion<'_>| read_flight_log(&flight.log, flight, height);
+    if flight.height.datum().is_some() {
+        let height =
+            if raises_log(scenario) { HeightConversion::MslToEllipsoid } else { HeightConversion::None };
+        return Ok(read(height)?);
     }
+    let ground = scenario.scene.terrain.as_ref().map(Ground::read).transpose()?;
+    let ground_m = |at: Geodetic| ground.as_ref()?.height_m(at);
+    let log = read(match flight.height {
+        FlightHeight::Takeoff => HeightConversion::AboveTakeoff(&ground_m),
+        _ => HeightConversion::AboveGround(&ground_m),
+    })?;
+    if log.frame.is_none() {
+        return Err(LoadError::NoOrigin { log: flight.log.clone(), key: "scene.terrain" });
+    }
+    Ok(log)
+}
+
+/// Whether heights of the log above mean sea level become ellipsoidal, as those of the terrain are.
+fn raises_log(scenario: &Scenario) -> bool {
+    scenario.log_datum() == HeightReference::Msl && terrain_datum(scenario) == HeightReference::Ellipsoid
+}
+
+/// Whether heights of the terrain above mean sea level become ellipsoidal, as those of the log are.
+fn raises_terrain(scenario: &Scenario) -> bool {
+    scenario.log_datum() == HeightReference::Ellipsoid && terrain_datum(scenario) == HeightReference::Msl
+}
+
+/// The terrain's vertical datum; without a terrain, the log's.
+fn terrain_datum(scenario: &Scenario) -> HeightReference {
+    scenario.scene.terrain.as_ref().map_or_else(|| scenario.log_datum(), |terrain| terrain.height)
 }
 
 /// Start (path time, seconds) and number of frames: those whose stamps are inside the window.

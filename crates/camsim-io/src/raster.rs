@@ -12,6 +12,7 @@ pub(crate) mod files;
 mod geo_tags;
 mod georeference;
 mod grid_tiles;
+mod ground;
 mod height_files;
 mod height_unit;
 mod metadata;
@@ -42,6 +43,7 @@ use glam::DVec3;
 
 use crate::{raster::pictures::PictureError, text::wording::range};
 pub use documentation::documentation;
+pub use ground::Ground;
 pub(crate) use sidecar::{read_sidecar_mask, read_sidecar_tags, sidecar_files};
 pub(crate) use units::metres_per_unit_name;
 

@@ -28,15 +28,13 @@ fn scenario(name: &str) -> Scenario {
 fn files_of_the_scenarios_exist() {
     for name in ["demo.toml", "pattern.toml"] {
         let scenario = scenario(name);
+        let log_datum = scenario.log_datum();
         let mut files = vec![scenario.flight.log];
         files.extend(scenario.camera.photometric.vignette);
         files.extend(scenario.scene.pattern.map(|pattern| pattern.image));
         if let Some(terrain) = scenario.scene.terrain {
             // With equal height references the demo needs no geoid.
-            assert_eq!(
-                (scenario.flight.height, terrain.height),
-                (HeightReference::Msl, HeightReference::Msl)
-            );
+            assert_eq!((log_datum, terrain.height), (HeightReference::Msl, HeightReference::Msl));
             files.extend(terrain.dem.paths().iter().cloned());
             files.extend(terrain.ortho.iter().flat_map(|ortho| ortho.paths().to_vec()));
         }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat},
+    scenario::{AttitudeSource, FlightHeight, FlightSpec, LogFormat},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DQuat, DVec3, EulerRot};
@@ -17,7 +17,7 @@ fn ellipsoid() -> FlightSpec {
 }
 
 fn msl() -> FlightSpec {
-    FlightSpec { height: HeightReference::Msl, ..ellipsoid() }
+    FlightSpec { height: FlightHeight::Msl, ..ellipsoid() }
 }
 
 fn track(spec: FlightSpec) -> FlightSpec {

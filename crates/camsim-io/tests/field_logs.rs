@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion, Note},
-    scenario::{AngleUnit, AttitudeSource, FlightSpec, HeightReference, LogFormat, TimeUnit},
+    scenario::{AngleUnit, AttitudeSource, FlightHeight, FlightSpec, LogFormat, TimeUnit},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DVec3, EulerRot};
@@ -80,7 +80,7 @@ fn faulty_logs_are_read_or_refused_as_expected() {
     let level = || Flight { climb_m: 0.0, ..USUAL };
     let usual = || USUAL;
     let local = || Flight { origin: None, ..USUAL };
-    let msl = || FlightSpec { height: HeightReference::Msl, ..spec() };
+    let msl = || FlightSpec { height: FlightHeight::Msl, ..spec() };
     let time = |time_unit| FlightSpec { time_unit, ..spec() };
     let angle = |angle_unit| FlightSpec { angle_unit, ..spec() };
     let airsim = || Flight { yaw_deg: 30.0, north_m: 200.0, climb_m: 20.0, ..local() };
@@ -128,7 +128,7 @@ fn faulty_logs_are_read_or_refused_as_expected() {
         ),
         (
             "time-unit-guess/px4_global.csv",
-            FlightSpec { height: HeightReference::Msl, time_unit: TimeUnit::Us, ..track() },
+            FlightSpec { height: FlightHeight::Msl, time_unit: TimeUnit::Us, ..track() },
             Gives(Flight {
                 yaw_deg: 0.0,
                 warnings: &["`alt` counts, because flight.height is \"msl\""],
@@ -193,7 +193,7 @@ fn faulty_logs_are_read_or_refused_as_expected() {
         // Times, quotes, separators, missing values.
         (
             "bad-message/a.gpx",
-            FlightSpec { height: HeightReference::Msl, ..track() },
+            FlightSpec { height: FlightHeight::Msl, ..track() },
             Gives(Flight { rows: 1, seconds: 0.0, north_m: 0.0, climb_m: 0.0, yaw_deg: 0.0, ..usual() }),
         ),
         (
@@ -378,7 +378,7 @@ fn published_flights_are_read_or_refused_as_expected() {
     };
     // File, settings, and number of rows or a substring of the message.
     let ned = || format(LogFormat::CsvNed);
-    let msl = || FlightSpec { height: HeightReference::Msl, ..spec() };
+    let msl = || FlightSpec { height: FlightHeight::Msl, ..spec() };
     let cases: [(&str, FlightSpec, Result<usize, &str>); 21] = [
         ("flights/demo_brighton_lawnmower_x0.05.csv", spec(), Ok(5886)),
         ("flights/demo_sertig_lawnmower_x5.5.csv", spec(), Ok(10_618)),
@@ -417,7 +417,7 @@ fn published_flights_are_read_or_refused_as_expected() {
         let name = |text: String| text.replace(&format!("{}/", data.display()), "").replace('|', "\\|");
         let key = match (spec.format, spec.attitude) {
             (LogFormat::CsvNed, _) => "`format = \"csv-ned\"`",
-            _ if spec.height == HeightReference::Msl => "`height = \"msl\"`",
+            _ if spec.height == FlightHeight::Msl => "`height = \"msl\"`",
             (_, AttitudeSource::Track) => "`attitude = \"track\"`",
             _ => "",
         };

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{AttitudeSource, FlightSpec, HeightReference, HeightSource, Origin},
+    scenario::{AttitudeSource, FlightHeight, FlightSpec, HeightSource, Origin},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DVec3, EulerRot};
@@ -15,7 +15,7 @@ use glam::{DVec3, EulerRot};
 fn spec() -> FlightSpec {
     FlightSpec {
         origin: Origin::Geodetic([47.05, 8.31, 480.0]),
-        height: HeightReference::Msl,
+        height: FlightHeight::Msl,
         ..FlightSpec::default()
     }
 }
@@ -26,7 +26,7 @@ fn topic(topic: &str) -> FlightSpec {
 
 /// Heights are above the ellipsoid, the attitude is that of the path.
 fn glider() -> FlightSpec {
-    FlightSpec { height: HeightReference::Ellipsoid, ..path() }
+    FlightSpec { height: FlightHeight::Ellipsoid, ..path() }
 }
 
 fn path() -> FlightSpec {
@@ -405,7 +405,7 @@ fn instances_frames_and_flags_are_read_as_the_files_state_them() {
 }
 
 fn glider_with_attitude() -> FlightSpec {
-    FlightSpec { height: HeightReference::Ellipsoid, ..spec() }
+    FlightSpec { height: FlightHeight::Ellipsoid, ..spec() }
 }
 
 /// A flight record of 6 s with header records.

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat, Origin},
+    scenario::{AttitudeSource, FlightHeight, FlightSpec, LogFormat, Origin},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::{DMat3, DQuat, DVec3, EulerRot};
@@ -17,7 +17,7 @@ use glam::{DMat3, DQuat, DVec3, EulerRot};
 fn spec() -> FlightSpec {
     FlightSpec {
         origin: Origin::Geodetic([47.05, 8.31, 480.0]),
-        height: HeightReference::Msl,
+        height: FlightHeight::Msl,
         ..FlightSpec::default()
     }
 }
@@ -459,7 +459,7 @@ fn units_and_datums_beside_the_rows_are_applied_or_named() {
             "above ground",
             flight(&format!("# alt is AGL\n{names}"), metres),
             spec(),
-            named(&["add the height of the ground"]),
+            named(&["flight.height = \"takeoff\""]),
         ),
         ("agrees", flight(&format!("# heights AMSL (EGM96)\n{names}"), metres), spec(), named(&[])),
         (
@@ -523,7 +523,7 @@ fn conventions_beside_the_rows_are_named() {
         ("Magnetic declination: 3.0 deg", &["add the declination"]),
         ("home altitude above ground 2 m", &[]),
         ("Sensor height: 1.5 m above ground", &[]),
-        ("heights above ground, which is at 480 m", &["add the height of the ground"]),
+        ("heights above ground, which is at 480 m", &["flight.height = \"takeoff\""]),
         ("logger WGS72 firmware", &[]),
         ("Datum: WGS72", &["positions are taken as WGS 84"]),
     ];

@@ -243,11 +243,9 @@ fn ground_outside_of_the_ortho_image_follows_the_key() {
     let spec = TerrainSpec { ortho: Some(small_picture(folder.path()).into()), ..spec("ortho/dem.tif") };
     let fraction = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
     let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
-    for (beyond, expected) in [
-        (Beyond::Grey, "is grey"),
-        (Beyond::Edge, "of the colours at its border"),
-        (Beyond::Void, "is void"),
-    ] {
+    for (beyond, expected) in
+        [(Beyond::Grey, "is grey"), (Beyond::Edge, "of the colours at its border"), (Beyond::Void, "is void")]
+    {
         let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
         let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
         assert!(

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion, body_from_euler_deg},
-    scenario::{AttitudeSource, FlightSpec, HeightReference, Origin},
+    scenario::{AttitudeSource, FlightHeight, FlightSpec, Origin},
 };
 use camsim_io::flight_log::read_flight_log;
 use glam::DVec3;
@@ -15,7 +15,7 @@ use glam::DVec3;
 const ORIGIN: [f64; 3] = [47.0, 8.0, 500.0];
 
 fn spec() -> FlightSpec {
-    FlightSpec { origin: Origin::Geodetic(ORIGIN), height: HeightReference::Msl, ..FlightSpec::default() }
+    FlightSpec { origin: Origin::Geodetic(ORIGIN), height: FlightHeight::Msl, ..FlightSpec::default() }
 }
 
 fn topic(topic: &str) -> FlightSpec {
@@ -101,7 +101,7 @@ fn every_format_gives_the_circle() {
             warnings: &["1 of 22 fixes have no GNSS height"],
             ..case(
                 "glider.igc",
-                FlightSpec { height: HeightReference::Ellipsoid, ..track() },
+                FlightSpec { height: FlightHeight::Ellipsoid, ..track() },
                 21,
                 [0.05, 0.51, 2.0],
             )
@@ -116,7 +116,7 @@ fn every_format_gives_the_circle() {
             warnings: &["1 messages of `/fix` have no fix"],
             ..case(
                 "fix_imu.mcap",
-                FlightSpec { height: HeightReference::Ellipsoid, ..spec() },
+                FlightSpec { height: FlightHeight::Ellipsoid, ..spec() },
                 81,
                 [0.51, 0.001, 0.02],
             )

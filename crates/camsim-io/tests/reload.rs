@@ -32,7 +32,7 @@ fn assert_alike(a: &Loaded, b: &Loaded, what: &str) {
 fn only_changed_parts_are_read_again() {
     let before = load_sequence(&demo(&[])).unwrap();
     // Key, value, and whether flight, scene and vignette are reused.
-    let cases: [(&str, &str, [bool; 3]); 8] = [
+    let cases: [(&str, &str, [bool; 3]); 9] = [
         ("camera.lens.coefficients", "[0.1, 0.0]", [true, true, true]),
         ("camera.mount.angles_deg", "[0.0, -90.0, 0.0]", [true, true, true]),
         ("flight.window_s", "[1.0, 2.0]", [true, true, true]),
@@ -41,6 +41,7 @@ fn only_changed_parts_are_read_again() {
         ("scene.sky", "[0.0, 0.0, 0.0]", [true, false, true]),
         ("camera.photometric.noise_sigma", "0.5", [true, true, true]),
         ("flight.height", "ellipsoid", [false, false, true]),
+        ("flight.height", "ground", [false, false, true]),
     ];
     for (key, value, expected_reuse) in cases {
         let scenario = demo(&[(key, value)]);

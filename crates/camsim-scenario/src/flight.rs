@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    HeightReference,
+    HeightReference, Scenario,
     keys::{Table, Words},
 };
 
@@ -30,8 +30,8 @@ pub struct FlightSpec {
     /// latitude, longitude and height on WGS-84.
     #[key(unit = "deg, deg, m", step = 0.0001, names = "lat lon h")]
     pub origin: Origin,
-    /// Vertical reference of the log's heights.
-    pub height: HeightReference,
+    /// What the log's heights are above.
+    pub height: FlightHeight,
     /// Instrument of the heights, where a log has several.
     pub height_from: HeightSource,
     /// Stream of a log that has several. It is that of the positions and, behind a comma, that of the
@@ -59,6 +59,16 @@ impl FlightSpec {
     #[must_use]
     pub fn new(log: impl Into<PathBuf>) -> Self {
         Self { log: log.into(), ..Self::default() }
+    }
+}
+
+impl Scenario {
+    /// Vertical datum of the log's heights; that of the terrain where they are above the ground.
+    #[must_use]
+    pub fn log_datum(&self) -> HeightReference {
+        let of_terrain =
+            || self.scene.terrain.as_ref().map_or_else(Default::default, |terrain| terrain.height);
+        self.flight.height.datum().unwrap_or_else(of_terrain)
     }
 }
 
@@ -91,6 +101,53 @@ pub enum LogFormat {
     Dataflash,
     /// ROS messages in an MCAP file.
     Mcap,
+}
+
+/// What the heights of a log are above.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Words)]
+#[serde(rename_all = "lowercase")]
+pub enum FlightHeight {
+    /// The WGS-84 ellipsoid.
+    #[default]
+    Ellipsoid,
+    /// Mean sea level (EGM96 geoid).
+    Msl,
+    /// The ground below each row, that of `scene.terrain.dem`.
+    Ground,
+    /// The ground below the first good row, that of `scene.terrain.dem`.
+    Takeoff,
+}
+
+impl FlightHeight {
+    /// The vertical datum; `None` of heights above the ground, which have that of the terrain.
+    #[must_use]
+    pub fn datum(self) -> Option<HeightReference> {
+        match self {
+            Self::Ellipsoid => Some(HeightReference::Ellipsoid),
+            Self::Msl => Some(HeightReference::Msl),
+            Self::Ground | Self::Takeoff => None,
+        }
+    }
+
+    /// The name, for messages: "above the ellipsoid".
+    #[must_use]
+    pub fn surface(self) -> &'static str {
+        match self {
+            Self::Ellipsoid => "the ellipsoid",
+            Self::Msl => "mean sea level",
+            Self::Ground => "the ground",
+            Self::Takeoff => "take-off",
+        }
+    }
+}
+
+impl From<HeightReference> for FlightHeight {
+    fn from(datum: HeightReference) -> Self {
+        match datum {
+            HeightReference::Ellipsoid => Self::Ellipsoid,
+            HeightReference::Msl => Self::Msl,
+        }
+    }
 }
 
 /// Instrument of the heights of a log.

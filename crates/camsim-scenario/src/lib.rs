@@ -56,7 +56,7 @@ pub use dataset::DatasetFormat;
 pub use face::Face;
 pub use file_list::FileList;
 pub use flight::{
-    AngleKind, AngleUnit, AttitudeSource, FlightSpec, HeightSource, LogFormat, Origin, TimeUnit,
+    AngleKind, AngleUnit, AttitudeSource, FlightHeight, FlightSpec, HeightSource, LogFormat, Origin, TimeUnit,
 };
 pub use image_sensor::{
     Companding, Demosaic, FlickerSpec, FlickerWave, ImageSensorSpec, Mosaic, PerChannel, ResponseCurve,

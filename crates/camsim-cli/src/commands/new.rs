@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::anyhow;
+use camsim_core::scenario::FlightHeight;
 use camsim_io::{builtin, load, portable::relative_to, write::write_atomic};
 
 use crate::{
@@ -38,6 +39,10 @@ pub struct NewArgs {
     /// Flight log of any format that is read
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// What the heights of --log are above: "takeoff" and "ground" are those of the terrain
+    #[arg(long, value_name = "SURFACE", default_value = "msl")]
+    #[arg(value_parser = clap::builder::PossibleValuesParser::new(FlightHeight::NAMES))]
+    height: String,
     /// Elevation model: a GeoTIFF, ASCII grid or HGT file
     #[arg(long, value_name = "FILE")]
     terrain: Option<PathBuf>,
@@ -180,9 +185,11 @@ fn scenario(args: &NewArgs, like: Like, purpose: Purpose, folder: &Path) -> Resu
     let flight = match &args.log {
         Some(log) => format!(
             "log = {}\n\
-             height = \"msl\"                     # of the log: above mean sea level, or \"ellipsoid\"\n\
+             height = {:<25} # what the log's heights are above: {}\n\
              # window_s = [0.0, 10.0]           # a part of the log, from its first row on\n",
-            folder.file(log)?
+            folder.file(log)?,
+            format!("\"{}\"", args.height),
+            FlightHeight::NAMES.join(", "),
         ),
         None if has_board => {
             folder.write(BOARD_MOTION, board_motion().as_bytes())?;
@@ -308,6 +315,9 @@ fn ask_for_all(args: &mut NewArgs) -> Result<(), Failure> {
         Ok(Some(ask(question)?).filter(|answer| !answer.is_empty()).map(PathBuf::from))
     };
     args.log = file("flight log (Enter: the built-in flight)")?;
+    if args.log.is_some() {
+        args.height = choose_word("what its heights are above", FlightHeight::NAMES, "msl")?;
+    }
     args.terrain = file("elevation model (Enter: the built-in terrain)")?;
     if args.terrain.is_some() {
         args.ortho = file("picture of the ground (Enter: none)")?;
@@ -320,17 +330,24 @@ fn ask_for_all(args: &mut NewArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Asks for one of the words.
+/// Asks for one of the values.
 fn choose<T: clap::ValueEnum>(what: &str, default: T) -> Result<T, Failure> {
     let name =
         |value: &T| value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-    let names = T::value_variants().iter().map(name).collect::<Vec<_>>().join(", ");
-    let answer = ask(&format!("{what}: {names} (Enter: {})", name(&default)))?;
-    if answer.is_empty() {
-        return Ok(default);
+    let names: Vec<String> = T::value_variants().iter().map(name).collect();
+    let answer = choose_word(what, &names, &name(&default))?;
+    Ok(T::from_str(&answer, true).unwrap_or(default))
+}
+
+/// Asks for one of the words.
+fn choose_word<S: AsRef<str>>(what: &str, words: &[S], default: &str) -> Result<String, Failure> {
+    let list = words.iter().map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
+    let answer = ask(&format!("{what}: {list} (Enter: {default})"))?.to_lowercase();
+    match answer.as_str() {
+        "" => Ok(default.to_owned()),
+        answer if words.iter().any(|word| word.as_ref() == answer) => Ok(answer.to_owned()),
+        answer => Err(Failure::bad_input(anyhow!("`{answer}` is not one of {list}"))),
     }
-    T::from_str(&answer, true)
-        .map_err(|_| Failure::bad_input(anyhow!("`{answer}` is no {what}: write one of {names}")))
 }
 
 fn ask(question: &str) -> Result<String, Failure> {

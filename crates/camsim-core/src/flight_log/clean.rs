@@ -39,7 +39,7 @@ struct CleanRow {
     states_attitude: bool,
 }
 
-pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, LogError> {
+pub(super) fn clean(raw: &[RawRow], options: &LogOptions<'_>) -> Result<FlightLog, LogError> {
     check_options(options)?;
     let first = raw.first().ok_or(LogError::Empty)?;
     let mut report = CleaningReport { rows_read: raw.len(), ..CleaningReport::default() };
@@ -55,7 +55,7 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
     let uses_log_attitude = options.attitude == AttitudeSource::Log;
     let continuous = uses_log_attitude && attitude::is_continuous(&usable, options.angles);
     report.angles = if continuous { AngleKind::Continuous } else { AngleKind::Wrapped };
-    let (mut rows, frame) = localise(&usable, options, continuous);
+    let (mut rows, frame) = localise(&usable, options, continuous, &mut report)?;
     // Attitudes of local logs are relative to the frame's own axes, wherever the row is.
     let tangent_frame = frame.filter(|_| matches!(usable[0].position, RawPosition::Geodetic(_)));
 
@@ -103,7 +103,7 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
     Ok(FlightLog { rows: log_rows, epoch_ns, frame, report, notes: Vec::new() })
 }
 
-fn check_options(options: &LogOptions) -> Result<(), LogError> {
+fn check_options(options: &LogOptions<'_>) -> Result<(), LogError> {
     if !(options.speed > 0.0 && options.speed.is_finite()) {
         return Err(LogError::BadSpeed(options.speed));
     }
@@ -161,32 +161,80 @@ fn sort_by_time(rows: &mut [&RawRow], report: &mut CleaningReport) {
 /// Converts positions to local NED and angles to attitudes; also returns the frame.
 fn localise(
     usable: &[&RawRow],
-    options: &LogOptions,
+    options: &LogOptions<'_>,
     continuous: bool,
-) -> (Vec<CleanRow>, Option<LocalFrame>) {
+    report: &mut CleaningReport,
+) -> Result<(Vec<CleanRow>, Option<LocalFrame>), LogError> {
     let mut geoid = GeoidCache::new();
-    let mut convert = |at: Geodetic| match options.height {
-        HeightConversion::None => at,
-        HeightConversion::MslToEllipsoid => Geodetic { height_m: at.height_m + geoid.undulation_m(at), ..at },
-        HeightConversion::EllipsoidToMsl => Geodetic { height_m: at.height_m - geoid.undulation_m(at), ..at },
-    };
     let mut frame = options.origin.map(LocalFrame::new);
+    let ground_m = ground_heights(usable, options.height, frame.as_ref(), report)?;
+    let mut convert = |row: usize, at: Geodetic| {
+        let by_m = match options.height {
+            HeightConversion::None => 0.0,
+            HeightConversion::MslToEllipsoid => geoid.undulation_m(at),
+            HeightConversion::EllipsoidToMsl => -geoid.undulation_m(at),
+            HeightConversion::AboveGround(_) => ground_m[row],
+            HeightConversion::AboveTakeoff(_) => ground_m[0],
+        };
+        Geodetic { height_m: at.height_m + by_m, ..at }
+    };
     let rows = usable
         .iter()
-        .filter_map(|row| {
+        .enumerate()
+        .filter_map(|(index, row)| {
             let position_ned_m = match row.position {
                 RawPosition::Geodetic(geodetic) => {
-                    let geodetic = convert(geodetic);
+                    let geodetic = convert(index, geodetic);
                     frame.get_or_insert_with(|| LocalFrame::new(geodetic)).ned_from_geodetic(geodetic)
                 }
-                RawPosition::Ned(ned) => ned,
+                RawPosition::Ned(ned) => match &frame {
+                    Some(frame) if !ground_m.is_empty() => {
+                        frame.ned_from_geodetic(convert(index, level_with_height(frame, ned)))
+                    }
+                    _ => ned,
+                },
             };
             let attitude = Attitude::from_raw(row.attitude, continuous);
             let states_attitude = row.attitude != RawAttitude::None;
             row.t_ns.map(|t_ns| CleanRow { line: row.line, t_ns, position_ned_m, attitude, states_attitude })
         })
         .collect();
-    (rows, frame)
+    Ok((rows, frame))
+}
+
+/// A local position as latitude and longitude of the point below it on the frame's plane, and the height above that.
+fn level_with_height(frame: &LocalFrame, ned_m: DVec3) -> Geodetic {
+    Geodetic { height_m: -ned_m.z, ..frame.geodetic_from_ned(ned_m.with_z(0.0)) }
+}
+
+/// Height of the ground below each row, or below the first; empty where no heights are above it.
+fn ground_heights(
+    usable: &[&RawRow],
+    height: HeightConversion<'_>,
+    frame: Option<&LocalFrame>,
+    report: &mut CleaningReport,
+) -> Result<Vec<f64>, LogError> {
+    let (ground, count) = match height {
+        HeightConversion::AboveGround(ground) => (ground, usable.len()),
+        HeightConversion::AboveTakeoff(ground) => (ground, 1),
+        _ => return Ok(Vec::new()),
+    };
+    let at = |row: &RawRow| match (row.position, frame) {
+        (RawPosition::Geodetic(geodetic), _) => ground(geodetic),
+        (RawPosition::Ned(ned), Some(frame)) => ground(level_with_height(frame, ned)),
+        // Without a frame there is no terrain, which the caller refuses.
+        (RawPosition::Ned(_), None) => Some(0.0),
+    };
+    let mut known: Vec<Option<f64>> = usable[..count].iter().map(|row| at(row)).collect();
+    let mut last = known.iter().find_map(|height_m| *height_m);
+    for (row, height_m) in usable.iter().zip(&mut known) {
+        if height_m.is_none() {
+            report.without_ground.add(row.line);
+        }
+        last = height_m.or(last);
+        *height_m = last;
+    }
+    known.into_iter().collect::<Option<Vec<f64>>>().ok_or(LogError::NoGround { line: usable[0].line })
 }
 
 struct Positions<'a>(&'a [CleanRow]);

@@ -66,6 +66,8 @@ pub struct CleaningReport {
     /// Dropped: height exactly 0 and far from the heights around, as receivers write before their first
     /// height.
     pub null_heights: Finding,
+    /// Height above the ground, where the terrain has none: that of the row before counts.
+    pub without_ground: Finding,
     /// Earlier than a row before them: sorted.
     pub out_of_order: Finding,
     /// Attitude missing or not finite: interpolated.
@@ -105,6 +107,7 @@ impl CleaningReport {
             unusable,
             null_fixes,
             null_heights,
+            without_ground,
             out_of_order,
             attitude_missing,
             attitude_glitches,
@@ -119,6 +122,7 @@ impl CleaningReport {
             unusable,
             null_fixes,
             null_heights,
+            without_ground,
             out_of_order,
             attitude_missing,
             attitude_glitches,
@@ -129,11 +133,15 @@ impl CleaningReport {
         repaired.into_iter().flat_map(|finding| std::mem::take(&mut finding.all)).collect()
     }
 
-    fn findings(&self) -> [(&'static str, &Finding); 9] {
+    fn findings(&self) -> [(&'static str, &Finding); 10] {
         [
             ("rows without usable time or position dropped", &self.unusable),
             ("rows without a fix (latitude or longitude 0) skipped", &self.null_fixes),
             ("rows without a height (0, far from the others) skipped", &self.null_heights),
+            (
+                "rows beyond the heights of the terrain, above the ground of the row before",
+                &self.without_ground,
+            ),
             ("rows out of order sorted", &self.out_of_order),
             ("missing attitudes interpolated", &self.attitude_missing),
             ("attitude glitches interpolated", &self.attitude_glitches),

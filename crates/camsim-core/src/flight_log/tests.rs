@@ -323,7 +323,7 @@ fn track_circle(rate_rad_s: f64) -> FlightLog {
     FlightLog::from_raw(&rows, &by_track()).unwrap()
 }
 
-fn by_track() -> LogOptions {
+fn by_track() -> LogOptions<'static> {
     LogOptions { attitude: AttitudeSource::Track, ..LogOptions::default() }
 }
 

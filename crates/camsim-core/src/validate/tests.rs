@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::scenario::{
-    BoardSpec, FieldOr, FilesOfSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, MAX_BLUR_SAMPLES,
-    MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, ObjectsOf, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec,
+    BoardSpec, FieldOr, FilesOfSpec, FlightHeight, FlightSpec, GltfSpec, LensSpec, LightSpec,
+    MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, ObjectsOf, PatternSpec, SceneSpec, VibrationSpec,
+    ZoomSpec,
 };
 
 pub(crate) fn good() -> Scenario {
@@ -54,6 +55,7 @@ fn each_value_out_of_range_is_named_once() {
     type Edit = fn(&mut Scenario);
     let cases: &[(&str, Edit)] = &[
         ("flight.log", |s| s.flight.log = PathBuf::new()),
+        ("flight.height", |s| s.flight.height = FlightHeight::Takeoff),
         ("flight.window_s", |s| s.flight.window_s = Some([5.0, 2.0])),
         ("flight.window_s", |s| s.flight.window_s = Some([0.0, f64::NAN])),
         ("flight.speed", |s| s.flight.speed = 0.0),

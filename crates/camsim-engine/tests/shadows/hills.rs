@@ -12,9 +12,9 @@ use camsim_engine::{Backend, Engine};
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::{
-    SKY, SUN, block,
+    SKY, SUN, block, by_reference,
     common::{engine, fixtures, render, sequence, steady},
-    level_ground, light, looking_down, psnr_db, reference,
+    level_ground, light, looking_down, psnr_db,
 };
 
 /// Hills of 256 m with a texture of stripes, and a house of 12 m on them.
@@ -87,7 +87,7 @@ fn expect_hills(who: &str, engine: &Engine, scene: Scene) {
     let sequence = over_hills(scene);
     let reference = ReferenceRenderer::new(sequence.clone()).expect("a reference");
     let near = near_borders(&reference);
-    let truth = reference(&sequence);
+    let truth = by_reference(&sequence);
     let done = render(engine, &sequence, &[Channel::Color], 0);
     let [borders_db, others_db] = psnr_db(&truth, done.frame.color_rgba(), &near);
     let fraction = near.iter().filter(|&&near| near).count() as f64 / near.len() as f64;
@@ -124,7 +124,7 @@ fn without_shadows_pictures_keep_their_bytes() {
         let scene = Scene { terrain: Some(level_ground(&light)), light: Some(light), ..Scene::default() };
         let sequence =
             sequence(looking_down([64, 48], 90.0), steady(40.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
-        (render(&Engine::cpu(), &sequence, &[Channel::Color], 0).frame.into_color(), reference(&sequence))
+        (render(&Engine::cpu(), &sequence, &[Channel::Color], 0).frame.into_color(), by_reference(&sequence))
     };
     assert_eq!(flat(true), flat(false));
     let house = |shadows: bool| {

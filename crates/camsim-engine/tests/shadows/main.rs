@@ -45,7 +45,7 @@ fn looking_down(size_px: [u32; 2], focal_px: f64) -> Scenario {
     scenario
 }
 
-fn reference(sequence: &Arc<Sequence>) -> Vec<f32> {
+fn by_reference(sequence: &Arc<Sequence>) -> Vec<f32> {
     let options =
         RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.2, ..RenderOptions::default() };
     ReferenceRenderer::new(sequence.clone()).expect("a reference").render(0, &options).into_color()

@@ -14,9 +14,9 @@ use camsim_engine::Engine;
 use glam::{DQuat, DVec3};
 
 use crate::{
-    block,
+    block, by_reference,
     common::{engine, render, sequence, steady},
-    level_ground, light, looking_down, psnr_db, reference,
+    level_ground, light, looking_down, psnr_db,
 };
 
 /// A box that flies 9 m above level ground at 30 m/s, past a lower one that stands, or without it.
@@ -47,7 +47,7 @@ fn passing(flies: bool) -> Arc<Sequence> {
 
 fn expect_passing(who: &str, engine: &Engine) {
     let [with, without] = [true, false].map(passing);
-    let (truth, bare) = (reference(&with), reference(&without));
+    let (truth, bare) = (by_reference(&with), by_reference(&without));
     let changed: Vec<bool> =
         truth.chunks_exact(4).zip(bare.chunks_exact(4)).map(|(a, b)| (a[0] - b[0]).abs() > 0.02).collect();
     let count = changed.iter().filter(|&&changed| changed).count();

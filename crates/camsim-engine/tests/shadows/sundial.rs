@@ -12,9 +12,9 @@ use camsim_engine::{Backend, Engine};
 use glam::{DVec2, DVec3};
 
 use crate::{
-    SKY, SUN, block,
+    SKY, SUN, block, by_reference,
     common::{engine, render, sequence, steady},
-    level_ground, light, looking_down, reference,
+    level_ground, light, looking_down,
 };
 
 const SIZE_PX: [u32; 2] = [160, 120];
@@ -169,7 +169,7 @@ fn expect_sundial(who: &str, picture: &[f32], least_db: f64) {
 
 #[test]
 fn reference_pictures_the_sundial() {
-    expect_sundial("reference", &reference(&sundial()), 50.0);
+    expect_sundial("reference", &by_reference(&sundial()), 50.0);
 }
 
 #[test]

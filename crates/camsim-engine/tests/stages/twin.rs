@@ -80,7 +80,7 @@ impl<'a> Twin<'a> {
                 table.dt_s.iter().map(pose).collect()
             }
         };
-        let reference = rows.last().map(|row| row.key_from_row);
+        let last_row = rows.last().map(|row| row.key_from_row);
         Self {
             case,
             plan,
@@ -88,7 +88,7 @@ impl<'a> Twin<'a> {
             color: ColorImage { size_px: ideal.size_px, rgba: color_rgba },
             depth: InverseDepthImage { size_px: ideal.size_px, values: inverse_depth },
             rows,
-            window_from_key: reference.filter(|_| plan.has_displaced_key()),
+            window_from_key: last_row.filter(|_| plan.has_displaced_key()),
             lens_map: if plan.ray == RayStage::LensMap { plan.camera.lens_inverse() } else { Vec::new() },
             weights: case.sequence.vignette_weights().1,
             noise_table: tail_table(),

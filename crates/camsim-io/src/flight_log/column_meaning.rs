@@ -1,6 +1,6 @@
 //! Meanings of columns.
 
-use camsim_core::scenario::HeightReference;
+use camsim_core::scenario::{FlightHeight, HeightReference};
 
 use super::units::Dimension;
 
@@ -23,8 +23,8 @@ pub(super) enum ColumnMeaning {
     Height(Option<HeightReference>),
     /// Height by air pressure; used only where no column is a [`ColumnMeaning::Height`].
     PressureHeight,
-    /// Height above take-off or ground, which is refused as the only height.
-    RelativeHeight,
+    /// Height above take-off or ground; used only where `flight.height` says so.
+    RelativeHeight(FlightHeight),
     North,
     East,
     Down,
@@ -73,7 +73,7 @@ impl ColumnMeaning {
 
     /// Whether a column is a height, of any kind.
     pub(super) fn is_height(self) -> bool {
-        matches!(self, Self::Height(_) | Self::PressureHeight | Self::RelativeHeight)
+        matches!(self, Self::Height(_) | Self::PressureHeight | Self::RelativeHeight(_))
     }
 
     /// The physical dimension of a column; `None` where it has no unit.
@@ -84,7 +84,7 @@ impl ColumnMeaning {
             Latitude | Longitude | LatitudeLongitude | Roll | Pitch | Yaw | MagneticYaw | Course | Gimbal => {
                 Some(Dimension::Angle)
             }
-            Height(_) | PressureHeight | RelativeHeight | Ground | North | East | Down | Grid
+            Height(_) | PressureHeight | RelativeHeight(_) | Ground | North | East | Down | Grid
             | EarthCentred | X | Y | Z => Some(Dimension::Length),
             DateTime | Date | Hemisphere | TimePart | Vehicle | Receiver | InUse | Fix(_) | HeightDatum
             | Qx | Qy | Qz | Qw => None,

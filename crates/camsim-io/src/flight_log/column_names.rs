@@ -2,7 +2,10 @@
 
 use std::{collections::HashMap, sync::LazyLock};
 
-use camsim_core::scenario::HeightReference::{Ellipsoid, Msl};
+use camsim_core::scenario::{
+    FlightHeight::{self, Takeoff},
+    HeightReference::{Ellipsoid, Msl},
+};
 
 use super::{
     column_meaning::{ColumnMeaning, ColumnMeaning::*, FixCode},
@@ -113,13 +116,18 @@ pub(super) static KNOWN_NAMES: &[KnownName] = &[
         "applied where there is no other height",
     ),
     known(
-        RelativeHeight,
+        RelativeHeight(Takeoff),
         "height_above_takeoff height_above_take_off osd_height rel_alt relative_alt relative_altitude \
-            alt_rel altitude_relative height_relative altitude_above_takeoff agl alt_agl altitude_agl \
-            height_agl height_above_ground height_above_ground_at_drone_location height_sonar vps_height \
-            radar_altitude radar_alt rangefinder_alt dist_bottom",
-        "height above take-off or ground",
-        "refused as the only height",
+            alt_rel altitude_relative height_relative altitude_above_takeoff",
+        "height above take-off",
+        "applied where flight.height is \"takeoff\"; else refused as the only height",
+    ),
+    known(
+        RelativeHeight(FlightHeight::Ground),
+        "agl alt_agl altitude_agl height_agl height_above_ground height_above_ground_at_drone_location \
+            height_sonar vps_height radar_altitude radar_alt rangefinder_alt dist_bottom",
+        "height above ground",
+        "applied where flight.height is \"ground\"; else refused as the only height",
     ),
     known(
         Ground,

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use camsim_core::{
     flight_log::{Note, RawAttitude, RawPosition, RawRow},
     geodesy::Geodetic,
-    scenario::{FlightSpec, HeightReference, LogFormat, TimeUnit},
+    scenario::{FlightHeight, FlightSpec, LogFormat, TimeUnit},
 };
 use roxmltree::{Document, Node};
 
@@ -133,7 +133,7 @@ fn metres(point: Node<'_, '_>) -> Result<f64, String> {
 fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) -> Vec<Note> {
     let mut notes = Vec::new();
     notes.extend(unused_topic_note(spec).into_iter().chain(unused_height_note(spec)));
-    if spec.height == HeightReference::Ellipsoid {
+    if spec.height == FlightHeight::Ellipsoid {
         let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set \
             flight.height = \"msl\" unless you know better";
         notes.push(Note::warning(text));

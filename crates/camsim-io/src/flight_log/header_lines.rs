@@ -334,7 +334,7 @@ fn refines(fine: ColumnMeaning, coarse: ColumnMeaning) -> bool {
     use ColumnMeaning::{Course, DateTime, Height, MagneticYaw, PressureHeight, RelativeHeight, Time, Yaw};
     matches!(
         (fine, coarse),
-        (Height(Some(_)) | PressureHeight | RelativeHeight, Height(None))
+        (Height(Some(_)) | PressureHeight | RelativeHeight(_), Height(None))
             | (MagneticYaw | Course, Yaw)
             | (DateTime, Time)
     )

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{HeightReference, HeightSource},
+    scenario::{FlightHeight, HeightSource},
 };
 
 use super::{
@@ -18,7 +18,7 @@ use super::{
 /// There is no height above a datum, or several among which none can be preferred.
 pub(super) fn height_column(
     header: &HeaderColumns,
-    wanted: Option<HeightReference>,
+    wanted: Option<FlightHeight>,
     source: HeightSource,
     notes: &mut Vec<Note>,
 ) -> Result<usize, String> {
@@ -27,6 +27,10 @@ pub(super) fn height_column(
         let column =
             column.ok_or("flight.height_from is \"pressure\", but no column is a height by air pressure")?;
         notes.push(pressure_warning(header, column));
+        return Ok(column);
+    }
+    if let Some(column) = wanted.map_or(Ok(None), |wanted| header.unique(RelativeHeight(wanted)))? {
+        header.check_usable(column)?;
         return Ok(column);
     }
     let all = header.columns_where(|meaning| matches!(meaning, Height(_)));
@@ -62,7 +66,10 @@ fn without_datum(
     source: HeightSource,
     notes: &mut Vec<Note>,
 ) -> Result<usize, String> {
-    match (header.unique(PressureHeight)?, header.columns(RelativeHeight).first()) {
+    let relative = [FlightHeight::Takeoff, FlightHeight::Ground]
+        .into_iter()
+        .find_map(|above| Some((*header.columns(RelativeHeight(above)).first()?, above)));
+    match (header.unique(PressureHeight)?, relative) {
         (Some(_), _) if source == HeightSource::Gnss => {
             Err("flight.height_from is \"gnss\", but the only height is by air pressure".to_owned())
         }
@@ -70,10 +77,12 @@ fn without_datum(
             notes.push(pressure_warning(header, column));
             Ok(column)
         }
-        (None, Some(&column)) => Err(format!(
-            "the only height, `{}`, is above take-off or ground: add the height of the take-off point and \
-                name the column alt",
-            header.name(column)
+        (None, Some((column, above))) => Err(format!(
+            "the only height, `{}`, is above {}: set flight.height = \"{}\", with a scene.terrain, or add the height \
+                of the ground and name the column alt",
+            header.name(column),
+            above.surface(),
+            above.name()
         )),
         (None, None) => Err(missing_columns_message(header)),
     }
@@ -84,10 +93,11 @@ fn without_datum(
 fn of_several(
     header: &HeaderColumns,
     all: &[usize],
-    wanted: HeightReference,
+    wanted: FlightHeight,
     notes: &mut Vec<Note>,
 ) -> Result<usize, String> {
-    let (of_wanted, without) = (header.columns(Height(Some(wanted))), header.columns(Height(None)));
+    let of_wanted = wanted.datum().map_or_else(Vec::new, |datum| header.columns(Height(Some(datum))));
+    let without = header.columns(Height(None));
     let others = all.len() - of_wanted.len() - without.len();
     let column = match (&of_wanted[..], &without[..], others) {
         ([column], ..) | ([], [column], 1) => *column,
@@ -103,24 +113,16 @@ fn of_several(
 }
 
 /// A warning if a column states another datum than `flight.height`.
-fn datum_warning(header: &HeaderColumns, column: usize, wanted: HeightReference) -> Option<Note> {
+fn datum_warning(header: &HeaderColumns, column: usize, wanted: FlightHeight) -> Option<Note> {
     let Height(Some(datum)) = header.parsed(column)?.meaning else { return None };
-    (datum != wanted).then(|| {
+    (wanted.datum() != Some(datum)).then(|| {
         Note::warning(format!(
             "the column `{}` says above {}, flight.height says \"{}\": set flight.height = \"{}\", or rename \
                 the column",
             header.name(column),
-            surface(datum),
+            FlightHeight::from(datum).surface(),
             wanted.name(),
             datum.name()
         ))
     })
-}
-
-/// What heights are above, in words.
-pub(super) fn surface(datum: HeightReference) -> &'static str {
-    match datum {
-        HeightReference::Ellipsoid => "the ellipsoid",
-        HeightReference::Msl => "mean sea level",
-    }
 }

@@ -11,7 +11,7 @@ mod times;
 mod units;
 
 use camsim_core::scenario::{
-    AngleKind, AngleUnit, AttitudeSource, HeightReference, HeightSource, LogFormat, TimeUnit,
+    AngleKind, AngleUnit, AttitudeSource, FlightHeight, HeightSource, LogFormat, TimeUnit,
 };
 
 use super::{tests::spec, *};

@@ -12,7 +12,7 @@
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{FlightSpec, HeightReference, LogFormat},
+    scenario::{FlightHeight, FlightSpec, HeightReference, LogFormat},
 };
 use roxmltree::{Document, Node};
 
@@ -32,9 +32,12 @@ use super::{
 pub(super) fn read(document: &Document<'_>, spec: &FlightSpec) -> Result<RawLog, String> {
     streams::check_format(spec, LogFormat::Kml)?;
     let root = document.root_element();
-    let rows = if elements(root, "Track").next().is_some() { tracks(root)? } else { placemarks(root)? };
+    let rows =
+        if elements(root, "Track").next().is_some() { tracks(root, spec)? } else { placemarks(root, spec)? };
     let mut notes: Vec<Note> = unused_topic_note(spec).into_iter().chain(unused_height_note(spec)).collect();
-    notes.extend(streams::height_note("heights of KML", HeightReference::Msl, spec));
+    if spec.height != FlightHeight::Ground {
+        notes.extend(streams::height_note("heights of KML", HeightReference::Msl, spec));
+    }
     notes.extend(offset_note(root));
     notes.extend(xml::notes(document));
     let has_angles = rows.iter().any(ParsedRow::has_attitude);
@@ -54,8 +57,8 @@ fn text_of<'a>(node: Node<'a, '_>, name: &'static str) -> Option<&'a str> {
 }
 
 /// The rows of all tracks, which may follow each other but not overlap.
-fn tracks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
-    let mut all = elements(root, "Track").map(track).collect::<Result<Vec<_>, _>>()?;
+fn tracks(root: Node<'_, '_>, spec: &FlightSpec) -> Result<Vec<ParsedRow>, String> {
+    let mut all = elements(root, "Track").map(|node| track(node, spec)).collect::<Result<Vec<_>, _>>()?;
     all.retain(|rows| !rows.is_empty());
     if all.is_empty() {
         return Err("its gx:Track has no points: export the flight again".to_owned());
@@ -73,7 +76,7 @@ fn tracks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
     }
 }
 
-fn track(track: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
+fn track(track: Node<'_, '_>, spec: &FlightSpec) -> Result<Vec<ParsedRow>, String> {
     let [times, positions, angles] =
         ["when", "coord", "angles"].map(|name| children(track, name).collect::<Vec<_>>());
     if times.len() != positions.len() || !(angles.is_empty() || angles.len() == times.len()) {
@@ -87,7 +90,7 @@ fn track(track: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
         ));
     }
     if !positions.is_empty() {
-        check_altitude_mode(track)?;
+        check_altitude_mode(track, spec)?;
     }
     let mut rows = Vec::with_capacity(times.len());
     for (index, (&when, &coord)) in times.iter().zip(&positions).enumerate() {
@@ -105,7 +108,7 @@ fn track(track: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
 }
 
 /// Placemarks with a time and a position each.
-fn placemarks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
+fn placemarks(root: Node<'_, '_>, spec: &FlightSpec) -> Result<Vec<ParsedRow>, String> {
     let mut rows = Vec::new();
     for placemark in elements(root, "Placemark") {
         let Some(point) = elements(placemark, "Point").next() else { continue };
@@ -114,7 +117,7 @@ fn placemarks(root: Node<'_, '_>) -> Result<Vec<ParsedRow>, String> {
         };
         let when = time("TimeStamp", "when").or_else(|| time("TimeSpan", "begin"));
         let Some((when, text)) = when.zip(text_of(point, "coordinates")) else { continue };
-        check_altitude_mode(point)?;
+        check_altitude_mode(point, spec)?;
         let mut row = streams::empty_row(line(point), Some(time_ns(when)?));
         row.position = position(text, |c| c == ',', line(point))?;
         rows.push(row);
@@ -138,14 +141,20 @@ fn time_ns(when: Node<'_, '_>) -> Result<i128, String> {
     xml::time_ns(when.text().unwrap_or("").trim(), line(when))
 }
 
-/// Refuses heights that are above no datum, by the mode of a geometry or of the nearest element around it.
-fn check_altitude_mode(node: Node<'_, '_>) -> Result<(), String> {
+/// Refuses heights that are not above what `flight.height` says, by the mode of a geometry or of the nearest element around it.
+fn check_altitude_mode(node: Node<'_, '_>, spec: &FlightSpec) -> Result<(), String> {
     let of_element =
         |node: Node<'_, '_>| children(node, "altitudeMode").next()?.text().map(|text| text.trim().to_owned());
     let stated = node.ancestors().find_map(of_element);
     let to_absolute = "write <altitudeMode>absolute</altitudeMode> into it";
     let problem = match stated.as_deref() {
-        Some(mode) if mode.eq_ignore_ascii_case("absolute") => return Ok(()),
+        Some(mode) if mode.eq_ignore_ascii_case("absolute") && spec.height != FlightHeight::Ground => return Ok(()),
+        Some(mode) if mode.eq_ignore_ascii_case("relativeToGround") && spec.height == FlightHeight::Ground => {
+            return Ok(());
+        }
+        Some(mode) if mode.eq_ignore_ascii_case("absolute") => {
+            "the altitudeMode is absolute, so the heights are above mean sea level: set flight.height = \"msl\"".to_owned()
+        }
         None => format!(
             "there is no altitudeMode, which in KML means that heights are not used (clampToGround): if they are \
                 above mean sea level, {to_absolute}"
@@ -155,8 +164,8 @@ fn check_altitude_mode(node: Node<'_, '_>) -> Result<(), String> {
                 {to_absolute}"
         ),
         Some(mode) => format!(
-            "the altitudeMode is {mode}, so the heights are above ground: export the flight with altitudes above \
-                mean sea level (absolute)"
+            "the altitudeMode is {mode}, so the heights are above ground: set flight.height = \"ground\", or export \
+                the flight with altitudes above mean sea level (absolute)"
         ),
     };
     Err(format!("line {}: {problem}", line(node)))

@@ -1,7 +1,7 @@
 //! Tables merged from messages, whose columns are named `MESSAGE.field`: MAVLink's and ArduPilot's as
 //! `mavlogdump.py --format csv` writes them. The message fixes units and datums.
 
-use camsim_core::scenario::HeightReference;
+use camsim_core::scenario::{FlightHeight, HeightReference};
 
 use super::{
     column_meaning::{ColumnMeaning, FixCode},
@@ -72,7 +72,7 @@ const MESSAGES: &[Message] = &[
             ("lat", Latitude, E7),
             ("lon", Longitude, E7),
             ("alt", MSL, MM),
-            ("relative_alt", RelativeHeight, MM),
+            ("relative_alt", RelativeHeight(FlightHeight::Takeoff), MM),
         ],
     },
     Message {
@@ -81,7 +81,7 @@ const MESSAGES: &[Message] = &[
             ("Lat", Latitude, DEGREES),
             ("Lng", Longitude, DEGREES),
             ("Alt", MSL, METRES),
-            ("RelHomeAlt", RelativeHeight, METRES),
+            ("RelHomeAlt", RelativeHeight(FlightHeight::Takeoff), METRES),
         ],
     },
     Message {
@@ -129,7 +129,7 @@ fn is_position(meaning: ColumnMeaning) -> bool {
             | North
             | East
             | Down
-            | RelativeHeight
+            | RelativeHeight(_)
             | Fix(_)
             | Receiver
             | InUse

@@ -5,13 +5,12 @@
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat},
+    scenario::{AttitudeSource, FlightHeight, FlightSpec, HeightReference, LogFormat},
 };
 
 use super::{
     RawLog, clock_rollover,
     columns::{AttitudeKind, Frame},
-    height_column::surface,
     quaternions, raw_row,
     rows::ParsedRow,
     sparse_rows, unused_keys,
@@ -189,10 +188,10 @@ pub(super) fn instance_note(name: &str, instances: &str, flown: u32) -> Note {
 
 /// A warning if `flight.height` says other than the heights of the file.
 pub(super) fn height_note(what: &str, datum: HeightReference, spec: &FlightSpec) -> Option<Note> {
-    (spec.height != datum).then(|| {
+    (spec.height.datum() != Some(datum)).then(|| {
         Note::warning(format!(
             "{what} are above {}, flight.height says otherwise: set flight.height = \"{}\"",
-            surface(datum),
+            FlightHeight::from(datum).surface(),
             datum.name()
         ))
     })

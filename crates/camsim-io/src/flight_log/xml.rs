@@ -89,7 +89,7 @@ fn problem(text: &str) -> Option<(&'static str, String)> {
     let above = if has("ELLIPSOID ELLIPSOIDAL HAE") {
         "the ellipsoid: set flight.height = \"ellipsoid\" if they are"
     } else if has("AGL") || has_pair("ABOVEGROUND") || has_pair("ABOVETAKEOFF") {
-        "ground: they are taken as flight.height says; convert them if they are not"
+        "ground: set flight.height = \"ground\" or \"takeoff\" if they are"
     } else {
         return None;
     };

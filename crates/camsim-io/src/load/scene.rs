@@ -3,7 +3,7 @@
 use std::{cell::RefCell, collections::HashSet, path::Path, sync::Arc};
 
 use camsim_core::{
-    flight_log::{FlightLog, HeightConversion},
+    flight_log::FlightLog,
     geodesy::{Geodetic, GeoidCache},
     scenario::{BoardSpec, GltfSpec, LightSpec, PatternCentre, Scenario},
     scene::{
@@ -16,10 +16,10 @@ use glam::DVec3;
 use super::{
     LoadError,
     far_models::{self, Copy},
-    height_conversions,
     motion::{carrier, model_motion},
     objects::{ModelObjects, ObjectList, name_or},
     placements::{Placement, read_placements},
+    raises_log, raises_terrain,
 };
 use crate::{
     board_file::read_board,
@@ -53,8 +53,7 @@ pub(super) fn load_scene(
         let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, "scene.terrain"))?;
         let ned =
             |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
-        let (_, shift_terrain) = height_conversions(scenario);
-        let shift = if shift_terrain { Some(&undulation_m as HeightShift<'_>) } else { None };
+        let shift = if raises_terrain(scenario) { Some(&undulation_m as HeightShift<'_>) } else { None };
         let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
         scene.terrain = Some(loaded.terrain);
         scene.terrain_object = objects.add(name_or(&terrain.name, "terrain"), terrain.class);
@@ -241,7 +240,7 @@ pub(super) fn position_ned_m(
     let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, key))?;
     let mut position = Geodetic::from_deg(lat_deg, lon_deg, height_m);
     // Heights have the datum of the log's.
-    if height_conversions(scenario).0 == HeightConversion::MslToEllipsoid {
+    if raises_log(scenario) {
         position.height_m += undulation_m(position.lat_rad, position.lon_rad);
     }
     Ok(frame.ned_from_geodetic(position))

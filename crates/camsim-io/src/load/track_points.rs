@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camsim_core::{
-    flight_log::{FlightLog, HeightConversion},
+    flight_log::FlightLog,
     geodesy::LocalFrame,
     scenario::{PointSource, Scenario},
     scene::ned_from_board,
@@ -12,8 +12,9 @@ use camsim_core::{
 use glam::DVec3;
 
 use super::{
-    LoadError, board_position_ned_m, height_conversions,
+    LoadError, board_position_ned_m,
     position_columns::{PositionColumns, check_names},
+    raises_log,
     scene::{position_ned_m, undulation_m},
 };
 use crate::{board_file::read_board, table::open_table};
@@ -47,7 +48,7 @@ impl TrackInputs {
         Ok(Self {
             given: spec.points.iter().map(of_source).collect::<Result<_, _>>()?,
             frame: log.frame,
-            shifts_heights: height_conversions(scenario).0 == HeightConversion::MslToEllipsoid,
+            shifts_heights: raises_log(scenario),
         })
     }
 

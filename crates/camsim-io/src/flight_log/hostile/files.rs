@@ -139,7 +139,7 @@ fn ambiguous_columns_are_refused() {
         &track(),
         "`alt_hae` counts",
     );
-    let msl = FlightSpec { height: HeightReference::Msl, ..track() };
+    let msl = FlightSpec { height: FlightHeight::Msl, ..track() };
     assert_flies(
         "two datums, the other one",
         &log("t,lat,lon,alt_msl,alt_hae", "T,LAT,LON,H,0"),
@@ -365,7 +365,7 @@ fn gpx_tracks_are_read() {
             )
         })
         .collect();
-    let msl = FlightSpec { height: HeightReference::Msl, ..track() };
+    let msl = FlightSpec { height: FlightHeight::Msl, ..track() };
     assert_flies("GPX", &gpx(&points), &msl, "not used: course");
     assert_flies(
         "GPX above the ellipsoid",

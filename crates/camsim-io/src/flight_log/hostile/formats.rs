@@ -32,7 +32,7 @@ pub(super) fn golden(name: &str) -> Vec<u8> {
 }
 
 fn msl() -> FlightSpec {
-    FlightSpec { height: HeightReference::Msl, ..auto() }
+    FlightSpec { height: FlightHeight::Msl, ..auto() }
 }
 
 pub(super) fn topic(name: &str) -> FlightSpec {

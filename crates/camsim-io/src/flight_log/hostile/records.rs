@@ -62,7 +62,7 @@ fn kml(inner: &str) -> String {
 #[test]
 fn kml_without_times_or_heights_is_refused() {
     let _report = FaultReport;
-    let spec = || FlightSpec { height: HeightReference::Msl, ..track() };
+    let spec = || FlightSpec { height: FlightHeight::Msl, ..track() };
     let track_of =
         |points: &str| kml(&format!("<gx:Track><altitudeMode>absolute</altitudeMode>{points}</gx:Track>"));
     let when = |second: u32| format!("<when>2023-05-01T10:00:{second:02}Z</when>");
@@ -91,6 +91,10 @@ fn kml_without_times_or_heights_is_refused() {
     ] {
         refused("a.kml", content.as_bytes(), &spec(), words);
     }
+    let relative = good.replace("absolute", "relativeToGround");
+    let above_ground = FlightSpec { height: FlightHeight::Ground, ..track() };
+    assert_eq!(warnings(&read_named("a.kml", relative.as_bytes(), &above_ground).unwrap()), "");
+    refused("a.kml", good.as_bytes(), &above_ground, &["flight.height = \"msl\""]);
     let two = good.replace(
         "</Placemark>",
         &format!(

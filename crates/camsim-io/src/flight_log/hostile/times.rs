@@ -207,7 +207,7 @@ fn times_in_parts_and_vehicles_are_read_or_refused() {
     assert_flies(
         "a ground station",
         &ground_station,
-        &FlightSpec { height: HeightReference::Msl, ..track() },
+        &FlightSpec { height: FlightHeight::Msl, ..track() },
         "",
     );
     // Streams one after the other are one flight.

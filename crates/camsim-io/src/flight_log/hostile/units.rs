@@ -31,7 +31,7 @@ fn header_units_are_applied_or_refused() {
         &track(),
         "flight.height = \"msl\"",
     );
-    let msl = FlightSpec { height: HeightReference::Msl, ..track() };
+    let msl = FlightSpec { height: FlightHeight::Msl, ..track() };
     assert_flies("the key says so too", &with_heights("t,lat,lon,\"alt [ft, MSL]\"", &feet), &msl, "");
     assert_flies("hae", &with_heights("t,lat,lon,HAE_m", &|m| m), &msl, "flight.height = \"ellipsoid\"");
     assert_flies("a line of units", &with_heights("t,lat,lon,alt\ns,deg,deg,ft", &feet), &track(), "");

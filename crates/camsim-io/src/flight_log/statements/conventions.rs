@@ -279,7 +279,11 @@ fn difference(convention: Convention, layout: &TableLayout, spec: &FlightSpec) -
         MeanSeaLevel => return other_height(HeightReference::Msl, height, spec),
         Ellipsoid => return other_height(HeightReference::Ellipsoid, height, spec),
         AboveGround => {
-            (is_geodetic, "heights are read as above what flight.height says: add the height of the ground")
+            let is_read_so =
+                spec.height.datum().is_none() || matches!(height, Some(ColumnMeaning::RelativeHeight(_)));
+            let problem = "heights are read as above what flight.height says: set flight.height = \"takeoff\" or \
+                \"ground\" if they are";
+            (is_geodetic && !is_read_so, problem)
         }
         AirPressure => (
             is_geodetic && height != Some(ColumnMeaning::PressureHeight),
@@ -344,7 +348,7 @@ fn other_height(stated: HeightReference, height: Option<ColumnMeaning>, spec: &F
         // The names are compared with the key where the column is chosen.
         return (named != stated).then(|| "the name of the column says otherwise, and counts".to_owned());
     }
-    (stated != spec.height).then(|| {
+    (spec.height.datum() != Some(stated)).then(|| {
         format!(
             "flight.height says \"{}\": set flight.height = \"{}\" if the line is about the heights",
             spec.height.name(),

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{FlightSpec, HeightReference},
+    scenario::{FlightHeight, FlightSpec, HeightReference},
 };
 
 use super::{
@@ -84,7 +84,7 @@ impl PositionReader {
                 height.is_finite() && height != 0.0
             })
         };
-        let uses_ellipsoid = spec.height == HeightReference::Ellipsoid
+        let uses_ellipsoid = spec.height == FlightHeight::Ellipsoid
             && matches!(fields, PositionFields::Geodetic { ellipsoid: Some(field), .. } if has_ellipsoid(field));
         let is_geodetic = reference.is_some() || matches!(fields, PositionFields::Geodetic { .. });
         if is_geodetic && !uses_ellipsoid {
