@@ -61,6 +61,13 @@ impl Failure {
         self.code
     }
 
+    /// The error alone, without its causes.
+    #[cfg(feature = "lab")]
+    #[must_use]
+    pub fn message(&self) -> String {
+        self.error.to_string()
+    }
+
     /// Whether the reader of the output has closed it, which is no failure (`camsim ... | head`).
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {

@@ -85,9 +85,15 @@ fn a_log_of_heights_above_take_off_needs_its_terrain_only() {
     let scenario = folder.path().join("flight.toml");
     let (log, scenario) = (log.to_str().unwrap(), scenario.to_str().unwrap());
     let (code, _, err) = camsim(&["new", scenario, "--log", log]);
-    assert!(code == 2 && err.contains("set flight.height = \"takeoff\""), "{err}");
-    fs::remove_file(scenario).unwrap();
-    let (code, out, err) = camsim(&["new", scenario, "--log", log, "--height", "takeoff"]);
+    assert!(
+        code == 2 && err.contains("set flight.height = \"takeoff\"") && err.contains("--height"),
+        "{err}"
+    );
+    let takeoff = ["new", scenario, "--log", log, "--height", "takeoff"];
+    let (code, _, err) = camsim(&takeoff);
+    assert!(code == 2 && err.contains("needs --terrain"), "{err}");
+    let dem = assets().join("demo_dem.tif");
+    let (code, out, err) = camsim(&[&takeoff[..], &["--terrain", dem.to_str().unwrap()]].concat());
     assert!(code == 0 && out.contains("m above ground"), "{out}{err}");
 }
 
@@ -102,6 +108,7 @@ fn what_cannot_be_is_refused_before_a_file_is_written() {
         (vec!["--log", log, "--for", "calibration"], "leave out --log"),
         (vec!["--terrain", "no-such.tif"], "no-such.tif"),
         (vec!["--ortho", "ortho.jpg"], "--terrain"),
+        (vec!["--height", "takeoff"], "--log"),
         (vec!["--camera", log, "--like", "euroc"], "--like"),
     ] {
         let (code, _, err) = camsim(&[&["new", scenario][..], &options].concat());

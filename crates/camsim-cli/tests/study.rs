@@ -37,7 +37,7 @@ fn run(study: &Path, output: &Path, more: &[&str]) -> (u8, String, String) {
 const READOUT: &str = r#"
 echo call >> calls
 readout=$(sed -n 's/^readout_ms = //p' "$0/camera.toml")
-pictures=$(ls "$0/color" | wc -l)
+pictures=$(ls "$0"/color/*.png | wc -l)
 echo "{\"readout\": $readout, \"frames\": {\"count\": $pictures}}" > "$1"
 "#;
 const VARY: &str = "seeds = [1, 2]\n[[vary]]\nkey = \"camera.shutter.readout_ms\"\nvalues = [0, 10.5, 20]\n";
@@ -60,7 +60,7 @@ fn every_point_is_run_once_and_new_values_are_added() {
 
     let (code, out, err) = run(&sweep, &output, &[]);
     assert_eq!((code, calls(folder.path())), (0, 6), "{err}");
-    assert!(out.contains("| 10.5 | 2.000 (2.000 .. 2.000) | 10.50 (10.50 .. 10.50) |"), "{out}");
+    assert!(out.contains("| 10.5 | 2 (2 .. 2) | 10.50 (10.50 .. 10.50) |"), "{out}");
     let table = fs::read_to_string(output.join("study.csv")).unwrap();
     let mut lines = table.lines();
     assert_eq!(lines.next().unwrap(), "camera.shutter.readout_ms,seed,frames.count,readout,folder,problem");
@@ -78,6 +78,43 @@ fn every_point_is_run_once_and_new_values_are_added() {
     // Another command has other results, of the same frames.
     let sweep = study(folder.path(), &format!("{READOUT} # other"), &more);
     assert_eq!((run(&sweep, &output, &[]).0, calls(folder.path())), (0, 16));
+}
+
+#[test]
+fn points_whose_frames_keys_scenario_or_script_change_are_run_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out");
+    let vary = "[[vary]]\nkey = \"camera.shutter.readout_ms\"\nvalues = [5]\n";
+    let own = folder.path().join("own.toml");
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
+    let text = fs::read_to_string(demo.join("demo.toml")).unwrap();
+    let absolute = |text: &str| {
+        ["demo_camera.toml", "demo_flight.csv", "demo_dem.tif", "demo_ortho.jpg"]
+            .iter()
+            .fold(text.to_owned(), |text, name| text.replace(name, demo.join(name).to_str().unwrap()))
+    };
+    fs::write(&own, absolute(&text)).unwrap();
+    let sweep = study(folder.path(), READOUT, vary);
+    let of_own = |from: &str, to: &str| {
+        let text = fs::read_to_string(&sweep).unwrap();
+        let first = text.lines().next().unwrap();
+        let text = text.replace(first, &format!("scenario = {own:?}"));
+        fs::write(&sweep, text.replace(from, to)).unwrap();
+        let (code, out, err) = run(&sweep, &output, &[]);
+        assert_eq!(code, 0, "{out}{err}");
+        out
+    };
+    assert!(of_own("", "").contains("| 5 | 2 |"));
+    // Fewer frames: those of before are not handed over.
+    assert!(of_own("0..2", "0..1").contains("| 5 | 1 |"));
+    assert_eq!(calls(folder.path()), 2);
+    of_own("\"camera.resized.scale\" = 0.05", "\"camera.resized.scale\" = 0.06");
+    assert_eq!(calls(folder.path()), 3);
+    fs::write(&own, absolute(&text.replace("20000.0", "500.0"))).unwrap();
+    of_own("", "");
+    assert_eq!(calls(folder.path()), 4);
+    of_own("", "");
+    assert_eq!(calls(folder.path()), 4);
 }
 
 #[test]
@@ -102,7 +139,7 @@ fn a_command_that_fails_hangs_or_writes_nonsense_is_told_and_the_rest_goes_on() 
     let script = r#"
 case $(sed -n 's/^readout_ms = //p' "$0/camera.toml") in
 1.0) echo lost the horizon; exit 3 ;;
-2.0) sleep 60 ;;
+2.0) sleep 60 & echo $! > sleeper; wait ;;
 3.0) echo "not numbers" > "$1" ;;
 4.0) ;;
 *) printf 'error\n1.5\n' > "$1" ;;
@@ -110,21 +147,27 @@ esac
 "#;
     let rest = "timeout_s = 2.0\nkeep_frames = false\n[[point]]\n\"camera.shutter.readout_ms\" = 1\n\
                 [[point]]\n\"camera.shutter.readout_ms\" = 2\n[[point]]\n\"camera.shutter.readout_ms\" = 3\n\
-                [[point]]\n\"camera.shutter.readout_ms\" = 4\n[[point]]\n\"camera.shutter.readout_ms\" = 5\n";
+                [[point]]\n\"camera.shutter.readout_ms\" = 4\n[[point]]\n\"camera.shutter.readout_ms\" = 5\n\
+                [[point]]\n\"flight.window_s\" = [900.0, 901.0]\n";
     let (sweep, output) = (study(folder.path(), script, rest), folder.path().join("out"));
     let (code, out, err) = run(&sweep, &output, &[]);
-    assert!(code == 1 && err.contains("4 of 5 points failed"), "{err}");
-    assert!(out.contains("| 5 | 1.500 |"), "{out}");
+    assert!(code == 1 && err.contains("5 of 6 points failed"), "{err}");
+    assert!(out.contains("| 5 |  | 1.500 |"), "{out}");
     let table = fs::read_to_string(output.join("study.csv")).unwrap();
     let lines: Vec<&str> = table.lines().collect();
     for (line, wanted) in [
-        (1, "exit status: 3: lost the horizon"),
+        (1, "exit status: 3; its last line: lost the horizon"),
         (2, "longer than timeout_s = 2"),
-        (3, "no row"),
+        (3, "nor a CSV table"),
         (4, "result"),
+        (6, "flight.window_s: none of the"),
     ] {
         assert!(lines[line].contains(wanted), "{}", lines[line]);
     }
+    // What a command has started ends with it.
+    let sleeper = fs::read_to_string(folder.path().join("sleeper")).unwrap();
+    let words = fs::read(format!("/proc/{}/cmdline", sleeper.trim())).unwrap_or_default();
+    assert!(words.is_empty(), "{}", String::from_utf8_lossy(&words));
     // The frames of the point that is done are removed, those of the others are there to look at.
     let data = |readout: u32| {
         let points = fs::read_dir(output.join("points")).unwrap().map(|entry| entry.unwrap().path());
@@ -144,6 +187,7 @@ fn a_wrong_study_is_refused_before_anything_is_rendered() {
         ("[[vary]]\nkey = \"camera.nonsense\"\nvalues = [1]\n", "camera.nonsense = 1"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = [10, -1]\n", "camera.fps = -1"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = []\n", "no values"),
+        ("[[vary]]\nkey = \"camera.fps\"\nvalues = [10, 10]\n", "two points are the same"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalue = [1]\n", "unknown field"),
         ("algorithm = \"tracking\"\n[[vary]]\nkey = \"camera.fps\"\nvalues = [1]\n", "remove one"),
         (
@@ -160,6 +204,10 @@ fn a_wrong_study_is_refused_before_anything_is_rendered() {
     let text = fs::read_to_string(&sweep).unwrap().replace(", \"{result}\"", "");
     fs::write(&sweep, text).unwrap();
     assert!(run(&sweep, &output, &[]).2.contains("does not name {result}"));
+    let sweep = study(folder.path(), "true", VARY);
+    let text = fs::read_to_string(&sweep).unwrap().replace("[\"sh\"", "[\"no-such-program\"");
+    fs::write(&sweep, text).unwrap();
+    assert!(run(&sweep, &output, &[]).2.contains("no program `no-such-program`"));
 }
 
 #[test]

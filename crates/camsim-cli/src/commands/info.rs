@@ -46,6 +46,21 @@ struct Part {
     without: &'static str,
 }
 
+/// The interfaces to adapters of this system.
+const GRAPHICS: &str = if cfg!(target_os = "macos") {
+    "Metal"
+} else if cfg!(windows) {
+    "Vulkan or DX12"
+} else {
+    "Vulkan"
+};
+
+/// Whether a window can be opened, as far as the environment says.
+fn has_display() -> bool {
+    !cfg!(target_os = "linux")
+        || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some())
+}
+
 /// What there is, and what each lack means.
 fn parts(engine: &Engine) -> Vec<Part> {
     let part = |name, here, without| Part { name, here, without };
@@ -56,7 +71,7 @@ fn parts(engine: &Engine) -> Vec<Part> {
             "the processor renders, at a fraction of the rate",
         ),
         part(
-            "Vulkan, Metal or DX12",
+            GRAPHICS,
             engine.adapter().is_some(),
             "--backend gpu and `camsim viewer` do not work; what the cpu renderer does not vectorise is computed in f64",
         ),
@@ -66,16 +81,11 @@ fn parts(engine: &Engine) -> Vec<Part> {
             "the cpu renderer is several times slower (x86-64 needs AVX2, FMA and F16C)",
         ),
         part("ffmpeg", has_ffmpeg(), "no mp4 and mkv; exr, png and y4m need nothing"),
-        part("viewer", cfg!(feature = "viewer"), "no `camsim viewer`; build with --features viewer"),
     ];
-    if cfg!(all(feature = "viewer", target_os = "linux")) {
-        let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
-        parts.push(part(
-            "display",
-            has_display,
-            "`camsim viewer` cannot open a window (DISPLAY, WAYLAND_DISPLAY)",
-        ));
-    }
+    parts.push(match (cfg!(feature = "viewer"), has_display()) {
+        (false, _) => part("viewer", false, "no `camsim viewer`; build with --features viewer"),
+        (true, here) => part("viewer", here, "no display: neither DISPLAY nor WAYLAND_DISPLAY is set"),
+    });
     parts.push(part(
         "experiments",
         cfg!(feature = "lab"),

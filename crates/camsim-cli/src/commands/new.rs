@@ -40,7 +40,7 @@ pub struct NewArgs {
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
     /// What the heights of --log are above: "takeoff" and "ground" are those of the terrain
-    #[arg(long, value_name = "SURFACE", default_value = "msl")]
+    #[arg(long, value_name = "SURFACE", default_value = "msl", requires = "log")]
     #[arg(value_parser = clap::builder::PossibleValuesParser::new(FlightHeight::NAMES))]
     height: String,
     /// Elevation model: a GeoTIFF, ASCII grid or HGT file
@@ -152,6 +152,13 @@ pub fn run(mut args: NewArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     });
     let purpose = args.purpose.unwrap_or_else(|| like.purpose());
     refuse_missing(&args)?;
+    let is_above_ground = FlightHeight::named(&args.height).is_some_and(|height| height.datum().is_none());
+    if is_above_ground && args.terrain.is_none() {
+        return Err(Failure::bad_input(anyhow!(
+            "--height {} needs --terrain, whose heights are the ground's",
+            args.height
+        )));
+    }
     if purpose == Purpose::Calibration && (args.log.is_some() || args.terrain.is_some()) {
         return Err(Failure::bad_input(anyhow!(
             "--for calibration moves the camera before a board: leave out --log and --terrain"
@@ -161,8 +168,13 @@ pub fn run(mut args: NewArgs, console: &mut Console<'_>) -> Result<(), Failure> 
     std::fs::create_dir_all(folder).or_failed()?;
     let text = scenario(&args, like, purpose, folder)?;
     write_atomic(&args.output, text.as_bytes()).or_failed()?;
-    console.line(format_args!("{}", args.output.display()))?;
-    check(&args.output, console)?;
+    let checked = check(&args.output, console);
+    if let Err(failure) = checked {
+        // The corrected command writes it again.
+        let _ = std::fs::remove_file(&args.output);
+        let is_of_height = failure.to_string().contains("flight.height = ");
+        return Err(if is_of_height { failure.of("--height names what heights are above") } else { failure });
+    }
     say_next(&args.output, purpose, console)
 }
 
@@ -284,7 +296,9 @@ fn board_motion() -> String {
 /// Loads what was written, and says what its cameras see.
 fn check(path: &Path, console: &mut Console<'_>) -> Result<(), Failure> {
     let rig = read_changed_rig(path, &Changes::default(), None, console)?;
-    for loaded in load_cameras(&rig, &[], console)? {
+    let cameras = load_cameras(&rig, &[], console)?;
+    console.line(path.display())?;
+    for loaded in cameras {
         let sequence = &loaded.sequence;
         let name = match sequence.scenario.camera.name.as_str() {
             "" => "camera".to_owned(),

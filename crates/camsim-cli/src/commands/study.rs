@@ -1,21 +1,22 @@
 //! `camsim study`.
 
 use std::{
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     fs,
     path::{Path, PathBuf},
 };
 
 use anyhow::anyhow;
-use camsim_io::write::write_atomic;
-use camsim_lab::study::{
-    ALGORITHMS, Algorithm, Done, Numbers, Point, Study, StudyError, plots, summary, table,
+use camsim_io::{
+    inputs::{file_fingerprints, scenario_fingerprints},
+    write::write_atomic,
 };
+use camsim_lab::study::{ALGORITHMS, Algorithm, Done, Numbers, Point, Study, plots, summary, table};
 
 use super::render::RenderBackend;
 use crate::{
     console::Console,
-    failure::{Failure, OrFail},
+    failure::{Failure, INTERRUPTED, OrFail},
     frame_list::Shard,
     inputs::{Changes, read_changed},
     interrupt,
@@ -52,7 +53,7 @@ pub struct StudyArgs {
     /// Study (TOML)
     #[arg(required_unless_present = "algorithms")]
     study: Option<PathBuf>,
-    /// Output folder [default: the study's name + "-study"]
+    /// Output folder [default: the study's name, that of --algorithm, and "-study"]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Run only the I-th of N parts of the points, with I from 1
@@ -84,52 +85,57 @@ pub fn run(args: &StudyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         }
         return Ok(());
     };
-    let study = Study::read(path).or_bad_input()?.with_algorithm(args.algorithm.as_deref());
+    let algorithm = args.algorithm.as_deref();
+    let study = Study::read(path).or_bad_input()?.with_algorithm(algorithm);
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-    let output = args.output.clone().unwrap_or_else(|| default_folder(path));
+    let output = args.output.clone().unwrap_or_else(|| default_folder(path, algorithm));
     let runner = Runner { study: &study, folder, output: &output, args };
-    let points = study.points();
-    runner.check_all(&points, console)?;
+    let tasks = runner.tasks(console)?;
     if args.dry_run {
-        for point in &points {
-            console.line(format_args!("{}\n  {}", point.label(), runner.command(point).describe()))?;
+        for task in &tasks {
+            console.line(format_args!("{}\n  {}", task.point.label(), runner.command(task).describe()))?;
         }
         return Ok(());
     }
-    runner.prepare()?;
+    runner.prepare(&tasks)?;
     let [shard, of] = args.shard.map_or([1, 1], |shard| shard.0);
-    let mine: Vec<&Point> =
-        (0..).zip(&points).filter(|(index, _)| index % of == shard - 1).map(|(_, point)| point).collect();
+    let mine: Vec<&Task> =
+        (0..).zip(&tasks).filter(|(index, _)| index % of == shard - 1).map(|(_, task)| task).collect();
     let mut problems = HashMap::new();
     let stop = interrupt::watch();
-    for (number, point) in (1..).zip(&mine) {
-        if runner.result(point).is_some() {
+    for (number, task) in (1..).zip(&mine) {
+        if task.result().is_some() {
             continue;
         }
-        console.note(format_args!("point {number} of {}: {}", mine.len(), point.label()));
-        match runner.run(point, &stop, console) {
+        console.note(format_args!("point {number} of {}: {}", mine.len(), task.point.label()));
+        match runner.run(task, &stop, console) {
             Ok(()) => {}
             Err(PointFailure::Point(problem)) => {
-                console.warn(format_args!("{}: {problem}", point.label()));
-                problems.insert(point.folder(), problem);
+                console.warn(format_args!("{}: {problem}", task.point.label()));
+                problems.insert(task.folder.clone(), problem);
             }
-            Err(PointFailure::All(failure)) => return Err(failure),
+            Err(PointFailure::Stopped) => {
+                return Err(Failure::interrupted(anyhow!(
+                    "{} of {} points have their results; continue: {}",
+                    mine.iter().filter(|task| task.result().is_some()).count(),
+                    mine.len(),
+                    console.command()
+                )));
+            }
         }
     }
     if let Some(shard) = args.shard {
-        let failed = problems.len();
         console.note(format_args!(
             "shard {shard}: {} of its {} points are done; without --shard, the same command writes the tables",
-            mine.len() - failed,
+            mine.len() - problems.len(),
             mine.len()
         ));
     } else {
-        let done = |point: Point| {
-            let problem = || problems.get(&point.folder()).cloned().unwrap_or_else(|| "not run".to_owned());
-            let result = runner.result(&point).ok_or_else(problem);
-            Done { point, result }
+        let done = |task: &Task| {
+            let problem = || problems.get(&task.folder).cloned().unwrap_or_else(|| "not run".to_owned());
+            Done { point: task.point.clone(), result: task.result().ok_or_else(problem) }
         };
-        let all: Vec<Done> = points.iter().cloned().map(done).collect();
+        let all: Vec<Done> = tasks.iter().map(done).collect();
         write_tables(&study, &all, &output, console)?;
     }
     match problems.len() {
@@ -141,8 +147,11 @@ pub fn run(args: &StudyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     }
 }
 
-fn default_folder(study: &Path) -> PathBuf {
+fn default_folder(study: &Path, algorithm: Option<&str>) -> PathBuf {
     let mut name = study.file_stem().unwrap_or("camsim".as_ref()).to_owned();
+    if let Some(algorithm) = algorithm {
+        name.push(format!("-{algorithm}"));
+    }
     name.push("-study");
     PathBuf::from(name)
 }
@@ -157,27 +166,58 @@ fn write_tables(
     let markdown = summary(all);
     write_atomic(&output.join("study.csv"), table(all).as_bytes()).or_failed()?;
     write_atomic(&output.join("study.md"), markdown.as_bytes()).or_failed()?;
+    // Plots of numbers and keys that the study no longer has go.
     let folder = output.join("plots");
-    match plots(study, all) {
-        Ok(plots) => {
-            fs::create_dir_all(&folder).or_failed()?;
-            for (name, svg) in plots {
-                write_atomic(&folder.join(name), svg.as_bytes()).or_failed()?;
-            }
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).or_failed()?;
+    for (name, svg) in plots(study, all) {
+        match svg {
+            Ok(svg) => write_atomic(&folder.join(name), svg.as_bytes()).or_failed()?,
+            Err(error) => console.warn(error),
         }
-        Err(error) => console.warn(error),
     }
     console.print(&markdown)?;
     console.note(format_args!("{}: study.csv, study.md, plots", output.display()));
     Ok(())
 }
 
+/// A point with what its frames and its result depend on.
+struct Task {
+    point: Point,
+    folder: PathBuf,
+    /// Keys, inputs, frames and layout.
+    of_frames: String,
+    /// These, and the command with its files.
+    of_result: String,
+}
+
+impl Task {
+    /// The numbers of a point that is done, by this command on these frames.
+    fn result(&self) -> Option<Numbers> {
+        let stated = fs::read_to_string(self.folder.join("result.txt")).ok()?;
+        (stated == self.of_result).then(|| Numbers::read(&self.folder.join("result")).ok()).flatten()
+    }
+
+    /// Removes what an earlier study has left that is not of these frames or of this command.
+    fn clear(&self) -> std::io::Result<()> {
+        fs::create_dir_all(&self.folder)?;
+        for old in ["result", "result.txt"] {
+            let _ = fs::remove_file(self.folder.join(old));
+        }
+        let (data, stated) = (self.folder.join("data"), self.folder.join("data.txt"));
+        if data.exists() && !fs::read_to_string(&stated).is_ok_and(|text| text == self.of_frames) {
+            fs::remove_dir_all(&data)?;
+        }
+        fs::write(stated, &self.of_frames)
+    }
+}
+
 /// What a point's failure ends.
 enum PointFailure {
     /// The point alone.
     Point(String),
-    /// The study: what it needs is missing, or the user has stopped it.
-    All(Failure),
+    /// The study, as the user wants.
+    Stopped,
 }
 
 /// What points are run with.
@@ -190,10 +230,6 @@ struct Runner<'a> {
 }
 
 impl Runner<'_> {
-    fn point_folder(&self, point: &Point) -> PathBuf {
-        self.output.join("points").join(point.folder())
-    }
-
     fn scenario(&self) -> PathBuf {
         self.folder.join(&self.study.scenario)
     }
@@ -202,81 +238,89 @@ impl Runner<'_> {
         Changes { sets: point.sets(self.study), preset: None }
     }
 
-    fn command(&self, point: &Point) -> Command {
-        Command::new(self.study, &self.point_folder(point), self.output, &self.args.python)
+    fn command(&self, task: &Task) -> Command {
+        Command::new(self.study, &task.folder, self.output, &self.args.python)
     }
 
-    /// Refuses points whose scenario is wrong, before the first is rendered.
-    fn check_all(&self, points: &[Point], console: &mut Console<'_>) -> Result<(), Failure> {
-        for point in points {
-            let read = read_changed(&self.scenario(), &self.changes(point), console);
-            read.map_err(|failure| failure.of(point.label()))?;
-        }
-        Ok(())
-    }
-
-    /// Writes the algorithm's scripts, and checks that their modules are there.
-    fn prepare(&self) -> Result<(), Failure> {
-        fs::create_dir_all(self.output).or_failed()?;
-        self.study.algorithm().map_or(Ok(()), |algorithm| {
-            command::write_scripts(algorithm, self.output)?;
-            command::check_modules(algorithm, &self.args.python)
-        })
-    }
-
-    /// The numbers of a point that is done, by this command on these frames.
-    fn result(&self, point: &Point) -> Option<Numbers> {
-        let folder = self.point_folder(point);
-        let stated = fs::read_to_string(folder.join("point.txt")).ok()?;
-        if stated != self.statement(point) {
-            return None;
-        }
-        Numbers::read(&folder.join("result")).ok()
-    }
-
-    /// What a point's result depends on.
-    fn statement(&self, point: &Point) -> String {
+    /// All points. Refuses those whose scenario is wrong, and points that are the same, before the first is rendered.
+    fn tasks(&self, console: &mut Console<'_>) -> Result<Vec<Task>, Failure> {
         let study = self.study;
-        let lines = point.sets(study).into_iter().map(|(key, value)| format!("{key} = {value}\n"));
-        let rest = format!(
-            "frames = {:?}\nlayout = {:?}\nalgorithm = {:?}\ncommand = {:?}\n",
-            study.frames,
-            study.layout(),
+        let command = format!(
+            "algorithm = {:?}\ncommand = {:?}\n{:?}\n",
             study.algorithm().map(|algorithm| algorithm.script),
-            study.command
+            study.command,
+            // A script that changes makes other results.
+            file_fingerprints(
+                study
+                    .command
+                    .iter()
+                    .map(|word| self.folder.join(word))
+                    .filter(|path| path.is_file())
+                    .collect()
+            )
         );
-        lines.collect::<String>() + &rest
+        let mut known = HashSet::new();
+        let mut tasks = Vec::new();
+        for point in study.points() {
+            if !known.insert(point.folder()) {
+                return Err(Failure::bad_input(anyhow!("two points are the same: {}", point.label())));
+            }
+            let read = read_changed(&self.scenario(), &self.changes(&point), console);
+            let rig = read.map_err(|failure| failure.of(point.label()))?.into_base();
+            let mut of_frames =
+                format!("{}\nframes = {:?}\nlayout = {:?}\n", point.label(), study.frames, study.layout());
+            for scenario in rig.scenarios() {
+                of_frames += &serde_json::to_string(scenario).or_failed()?;
+                of_frames += &format!("\n{:?}\n", scenario_fingerprints(scenario));
+            }
+            let of_result = format!("{of_frames}{command}");
+            let folder = self.output.join("points").join(point.folder());
+            tasks.push(Task { point, folder, of_frames, of_result });
+        }
+        Ok(tasks)
+    }
+
+    /// Writes the algorithm's scripts; refuses a program that is not there, and a Python without the modules.
+    fn prepare(&self, tasks: &[Task]) -> Result<(), Failure> {
+        fs::create_dir_all(self.output)
+            .map_err(|error| Failure::failed(anyhow!("{}: {error}", self.output.display())))?;
+        if let Some(algorithm) = self.study.algorithm() {
+            command::write_scripts(algorithm, self.output)?;
+            return command::check_modules(algorithm, &self.args.python);
+        }
+        tasks.first().map_or(Ok(()), |task| self.command(task).check_program(self.folder))
     }
 
     /// Renders a point and runs its command.
     fn run(
         &self,
-        point: &Point,
+        task: &Task,
         stop: &interrupt::Watch,
         console: &mut Console<'_>,
     ) -> Result<(), PointFailure> {
-        let folder = self.point_folder(point);
-        let all = |failure: Failure| PointFailure::All(failure);
-        fs::create_dir_all(&folder).or_failed().map_err(all)?;
-        for old in ["result", "point.txt"] {
-            let _ = fs::remove_file(folder.join(old));
+        if stop.is_asked() {
+            return Err(PointFailure::Stopped);
         }
-        frames::render(self, point, &folder.join("data"), console).map_err(all)?;
-        self.command(point).run(self.folder, self.study.timeout_s, stop).map_err(
-            |problem| match problem {
-                command::Problem::Stopped => PointFailure::All(Failure::interrupted(anyhow!(
-                    "{} points have their results; continue: {}",
-                    self.study.points().iter().filter(|point| self.result(point).is_some()).count(),
-                    console.command()
-                ))),
-                command::Problem::Failed(problem) => PointFailure::Point(problem),
+        let failed =
+            |error: std::io::Error| PointFailure::Point(format!("{}: {error}", task.folder.display()));
+        task.clear().map_err(failed)?;
+        frames::render(self, &task.point, &task.folder.join("data"), console).map_err(
+            |failure| match failure.code() {
+                INTERRUPTED => PointFailure::Stopped,
+                _ => PointFailure::Point(failure.message()),
             },
         )?;
-        Numbers::read(&folder.join("result"))
-            .map_err(|error: StudyError| PointFailure::Point(error.to_string()))?;
-        write_atomic(&folder.join("point.txt"), self.statement(point).as_bytes()).or_failed().map_err(all)?;
+        let command = self.command(task);
+        command.run(self.folder, self.study.timeout_s, stop).map_err(|problem| match problem {
+            command::Problem::Stopped => PointFailure::Stopped,
+            command::Problem::Failed(problem) => PointFailure::Point(problem),
+        })?;
+        Numbers::read(&task.folder.join("result"))
+            .map_err(|error| PointFailure::Point(command.with_last_words(&error.to_string())))?;
+        write_atomic(&task.folder.join("result.txt"), task.of_result.as_bytes())
+            .map_err(|error| PointFailure::Point(error.to_string()))?;
         if !self.study.keep_frames {
-            let _ = fs::remove_dir_all(folder.join("data"));
+            let _ = fs::remove_dir_all(task.folder.join("data"));
         }
         Ok(())
     }

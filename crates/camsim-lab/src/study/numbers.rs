@@ -4,6 +4,9 @@ use std::{collections::BTreeMap, path::Path};
 
 use super::StudyError;
 
+/// Columns of `study.csv` that are no numbers of a command's.
+const RESERVED: [&str; 3] = ["seed", "folder", "problem"];
+
 /// Named numbers, by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Numbers(pub BTreeMap<String, f64>);
@@ -22,6 +25,9 @@ impl Numbers {
             true => of_json(&text).map_err(wrong)?,
             false => of_csv(&text).map_err(wrong)?,
         };
+        if let Some(name) = numbers.keys().find(|name| RESERVED.contains(&name.as_str())) {
+            return Err(wrong(format!("`{name}` is a column of study.csv: give the number another name")));
+        }
         if numbers.is_empty() { Err(wrong("holds no number".into())) } else { Ok(Self(numbers)) }
     }
 }
@@ -73,7 +79,7 @@ fn of_csv(text: &str) -> Result<BTreeMap<String, f64>, String> {
         rows += 1.0;
     }
     if rows == 0.0 {
-        return Err("has no row below its header".into());
+        return Err("is neither a JSON object of numbers nor a CSV table with rows below its header".into());
     }
     Ok(header.into_iter().map(str::to_owned).zip(sums.into_iter().map(|sum| sum / rows)).collect())
 }
@@ -104,7 +110,8 @@ mod tests {
             (r#"{"a": "b"}"#, "`a`"),
             ("x,y\n1\n", "line 2 has 1 cells"),
             ("x\none\n", "`one` is no number"),
-            ("x\n", "no row"),
+            ("x\n", "nor a CSV table"),
+            (r#"{"seed": 1}"#, "another name"),
         ] {
             let error = read(text).expect_err(text);
             assert!(error.contains(wanted), "{error}");

@@ -30,7 +30,7 @@ fn text_of(value: &toml::Value) -> String {
 
 /// A few digits.
 fn short(value: f64) -> String {
-    let digits = if value == 0.0 { 0 } else { (3 - value.abs().log10().floor() as i32).clamp(0, 6) };
+    let digits = if value.fract() == 0.0 { 0 } else { (3 - value.abs().log10().floor() as i32).clamp(0, 6) };
     format!("{value:.*}", digits as usize)
 }
 
@@ -129,12 +129,11 @@ pub fn summary(all: &[Done]) -> String {
 }
 
 /// The study's plots, or, if it names none, one of each number; each with the name of its file.
-///
-/// # Errors
-/// A plot without points.
-pub fn plots(study: &Study, all: &[Done]) -> Result<Vec<(String, String)>, PlotError> {
+/// A plot without points is an error.
+#[must_use]
+pub fn plots(study: &Study, all: &[Done]) -> Vec<(String, Result<String, PlotError>)> {
     let specs = if study.plot.is_empty() { default_plots(all) } else { study.plot.clone() };
-    specs.iter().map(|spec| Ok((file_name(spec), plot(study, spec, all).svg()?))).collect()
+    specs.iter().map(|spec| (file_name(spec), plot(study, spec, all).svg())).collect()
 }
 
 fn file_name(spec: &PlotSpec) -> String {
@@ -153,8 +152,12 @@ fn default_plots(all: &[Done]) -> Vec<PlotSpec> {
     };
     let Some(&x) = keys.iter().find(is_axis) else { return Vec::new() };
     let by = keys.iter().find(|key| **key != x).map(|key| (*key).to_owned());
+    let has_values = |y: &&str| {
+        let numbers = all.iter().filter_map(|done| done.result.as_ref().ok());
+        numbers.filter_map(|numbers| numbers.0.get(*y)).any(|value| value.is_finite())
+    };
     let plot = |y: &str| PlotSpec { x: x.to_owned(), y: y.to_owned(), by: by.clone(), log: false };
-    names(all).into_iter().map(plot).collect()
+    names(all).into_iter().filter(has_values).map(plot).collect()
 }
 
 /// Points of a curve: x, and what is there.
@@ -209,7 +212,11 @@ fn curve_name(study: &Study, spec: &PlotSpec, point: &Point) -> String {
     let shown = others.filter(|(key, _)| spec.by.as_ref().is_none_or(|by| by == key));
     let names: Vec<String> =
         shown.map(|(key, value)| format!("{} {}", study.label(key), text_of(value))).collect();
-    if names.is_empty() { spec.y.clone() } else { names.join(", ") }
+    match (names.is_empty(), &spec.by) {
+        (true, Some(by)) => format!("{} -", study.label(by)),
+        (true, None) => spec.y.clone(),
+        (false, _) => names.join(", "),
+    }
 }
 
 #[cfg(test)]
@@ -244,14 +251,14 @@ mod tests {
     #[test]
     fn the_summary_has_means_and_ranges_over_the_seeds() {
         let summary = summary(&done(&study(Vec::new())));
-        assert_eq!(summary.lines().nth(2), Some("| 1 | one, two | 11.50 (11.00 .. 12.00) |"));
+        assert_eq!(summary.lines().nth(2), Some("| 1 | one, two | 11.50 (11 .. 12) |"));
         assert_eq!(summary.lines().count(), 6);
     }
 
     #[test]
     fn plots_have_a_curve_for_each_other_value_and_a_bar_for_each_spread() {
         let default = study(Vec::new());
-        let [(name, svg)] = &plots(&default, &done(&default)).expect("plots")[..] else { panic!("one plot") };
+        let [(name, Ok(svg))] = &plots(&default, &done(&default))[..] else { panic!("one plot") };
         assert_eq!(name, "e-over-a-by-b.svg");
         assert!(svg.contains("a, ms") && svg.contains("b three"), "{svg}");
         let spec = PlotSpec { x: "a".into(), y: "e".into(), by: None, log: false };
@@ -263,7 +270,7 @@ mod tests {
         assert_eq!(series[0].bars, [(1.0, 11.0, 12.0), (2.0, 21.0, 22.0)]);
         let missing = PlotSpec { y: "f".into(), ..spec };
         let missing = study(vec![missing]);
-        assert!(matches!(plots(&missing, &done(&missing)), Err(PlotError::Empty(_))));
+        assert!(matches!(plots(&missing, &done(&missing))[..], [(_, Err(PlotError::Empty(_)))]));
     }
 
     #[test]
@@ -272,6 +279,6 @@ mod tests {
         let mut all = done(&study);
         all[0].result = Err("broke".into());
         assert!(table(&all).lines().nth(1).is_some_and(|line| line.ends_with(",broke")));
-        assert!(summary(&all).contains("| 1 | one, two | 12.00 |"));
+        assert!(summary(&all).contains("| 1 | one, two | 12 |"));
     }
 }

@@ -19,6 +19,10 @@ use crate::{
 /// How often a running command is looked at.
 const LOOK: Duration = Duration::from_millis(30);
 
+/// How long a command may take to end after it was asked to.
+#[cfg(unix)]
+const GRACE: Duration = Duration::from_secs(2);
+
 /// Characters of a command's last words that a message has.
 const LAST_WORDS: usize = 400;
 
@@ -63,55 +67,100 @@ impl Command {
         self.words.iter().map(quoted).collect::<Vec<_>>().join(" ")
     }
 
+    /// Refuses a program that is not there.
+    pub fn check_program(&self, folder: &Path) -> Result<(), Failure> {
+        let Some(program) = self.words.first() else { return Ok(()) };
+        let is_there = match program.contains(std::path::MAIN_SEPARATOR) {
+            true => folder.join(program).is_file(),
+            // Elsewhere the names of programs have endings that the search adds.
+            false if cfg!(unix) => std::env::var_os("PATH")
+                .is_some_and(|all| std::env::split_paths(&all).any(|path| path.join(program).is_file())),
+            false => true,
+        };
+        if is_there {
+            return Ok(());
+        }
+        Err(Failure::bad_input(anyhow!(
+            "command: there is no program `{program}`: check the study, or install it"
+        )))
+    }
+
+    fn log(&self) -> PathBuf {
+        self.point.join("command.log")
+    }
+
+    /// A problem with the last line that the command has printed.
+    pub fn with_last_words(&self, problem: &str) -> String {
+        let text = fs::read_to_string(self.log()).unwrap_or_default();
+        match text.trim().lines().next_back() {
+            None => format!("{problem} (it printed nothing)"),
+            Some(last) => {
+                format!("{problem}; its last line: {}", last.chars().take(LAST_WORDS).collect::<String>())
+            }
+        }
+    }
+
     /// Runs it in a folder; its output goes to `command.log` of the point.
     pub fn run(&self, folder: &Path, timeout_s: Option<f64>, stop: &interrupt::Watch) -> Result<(), Problem> {
-        let log = self.point.join("command.log");
-        let failed = |what: String| Problem::Failed(what);
-        let file = |path: &Path| {
-            fs::File::create(path).map_err(|error| failed(format!("{}: {error}", path.display())))
-        };
-        let out = file(&log)?;
-        let err = out.try_clone().map_err(|error| failed(format!("{}: {error}", log.display())))?;
-        let (program, arguments) =
-            self.words.split_first().ok_or_else(|| failed("the command is empty".into()))?;
-        let mut child = process::Command::new(program)
-            .args(arguments)
-            .current_dir(folder)
-            .stdin(Stdio::null())
-            .stdout(out)
-            .stderr(err)
-            .spawn()
-            .map_err(|error| failed(format!("{program}: {error}: check command in the study")))?;
+        let mut child = self.spawn(folder).map_err(Problem::Failed)?;
         let begin = Instant::now();
         let status = loop {
             match child.try_wait() {
                 Ok(Some(status)) => break status,
                 Ok(None) => {}
-                Err(error) => return Err(failed(format!("{program}: {error}"))),
+                Err(error) => return Err(Problem::Failed(error.to_string())),
             }
-            let is_late = timeout_s.is_some_and(|limit_s| begin.elapsed().as_secs_f64() > limit_s);
-            if is_late || stop.is_asked() {
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(match is_late {
-                    true => failed(format!("took longer than timeout_s = {}", timeout_s.unwrap_or(0.0))),
-                    false => Problem::Stopped,
-                });
+            if stop.is_asked() {
+                end(&mut child);
+                return Err(Problem::Stopped);
+            }
+            if let Some(limit_s) = timeout_s.filter(|limit_s| begin.elapsed().as_secs_f64() > *limit_s) {
+                end(&mut child);
+                let problem = format!("the command took longer than timeout_s = {limit_s}");
+                return Err(Problem::Failed(self.with_last_words(&problem)));
             }
             #[allow(clippy::disallowed_methods, reason = "a program that ends tells no channel")]
             std::thread::sleep(LOOK);
         };
-        if stop.is_asked() {
-            return Err(Problem::Stopped);
+        match status.success() {
+            true => Ok(()),
+            false => Err(Problem::Failed(self.with_last_words(&format!("the command ended with {status}")))),
         }
-        if status.success() {
-            return Ok(());
-        }
-        let text = fs::read_to_string(&log).unwrap_or_default();
-        let last: String =
-            text.trim().lines().next_back().unwrap_or("it said nothing").chars().take(LAST_WORDS).collect();
-        Err(failed(format!("the command ended with {status}: {last} ({})", log.display())))
     }
+
+    /// Starts it in a process group of its own, so that all it starts can be ended, and Ctrl-C is for camsim.
+    fn spawn(&self, folder: &Path) -> Result<process::Child, String> {
+        let in_words = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
+        let log = self.log();
+        let out = fs::File::create(&log).map_err(|error| in_words(&log, error))?;
+        let err = out.try_clone().map_err(|error| in_words(&log, error))?;
+        let (program, arguments) = self.words.split_first().ok_or("the command is empty")?;
+        let mut command = process::Command::new(program);
+        command.args(arguments).current_dir(folder).stdin(Stdio::null()).stdout(out).stderr(err);
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command.spawn().map_err(|error| in_words(Path::new(program), error))
+    }
+}
+
+/// Ends a command and what it has started.
+fn end(child: &mut process::Child) {
+    #[cfg(unix)]
+    {
+        use rustix::process::{Pid, Signal, kill_process_group};
+
+        if let Some(group) = Pid::from_raw(child.id() as i32) {
+            let _ = kill_process_group(group, Signal::TERM);
+            let begin = Instant::now();
+            while begin.elapsed() < GRACE && matches!(child.try_wait(), Ok(None)) {
+                #[allow(clippy::disallowed_methods, reason = "a program that ends tells no channel")]
+                std::thread::sleep(LOOK);
+            }
+            let _ = kill_process_group(group, Signal::KILL);
+        }
+    }
+    let _ = child.kill();
+    let _ = child.wait();
 }
 
 fn scripts(output: &Path) -> PathBuf {
