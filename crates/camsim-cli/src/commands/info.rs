@@ -127,8 +127,10 @@ pub fn run(args: &InfoArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         ))?;
     }
     if let (Some(side_px), Some(bytes)) = (info.max_side_px, info.max_storage_buffer_bytes) {
-        console.line(format_args!("largest side  {side_px} px"))?;
-        console.line(format_args!("largest table {} MiB", bytes >> 20))?;
+        let mib = bytes >> 20;
+        console.line(format_args!(
+            "adapter       pictures up to {side_px} px a side, buffers up to {mib} MiB"
+        ))?;
     }
     console.line(format_args!("processors    {}", info.cpu_threads))?;
     let (here, lacking): (Vec<&Part>, Vec<&Part>) = info.parts.iter().partition(|part| part.here);
