@@ -121,7 +121,7 @@ def test_what_the_reference_renderer_cannot_do_is_said(pattern: pathlib.Path) ->
     with pytest.raises(camsim.InputError, match="cannot be combined with --backend reference"):
         camsim.Scenario.load(pattern, sets={"quality.solver": "rk2"}, backend="reference")
     with pytest.raises(camsim.InputError, match='"gpu" and "reference"'):
-        camsim.Scenario.load(pattern, backend="reference")
+        camsim.Scenario.load(pattern, backend="exact")
 
 
 def test_the_demo_needs_no_file(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path) -> None:
