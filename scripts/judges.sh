@@ -53,7 +53,7 @@ camsim schema -o "$dir/scenario.schema.json"
 camsim -q render --print-default > "$dir/default.toml"
 say "studies: camsim's algorithms"
 camsim -q new "$dir/board/flight.toml" --for calibration >/dev/null
-sed "s|^scenario = .*|scenario = \"board/flight.toml\"|; s|^frames = .*|set = { \"camera.fps\" = 2 }|" scripts/judges/study.toml >"$dir/calibration.toml"
+sed "s|^scenario = .*|scenario = \"board/flight.toml\"|; s|^frames = .*|set = { \"camera.fps\" = 1 }|" scripts/judges/study.toml >"$dir/calibration.toml"
 for algorithm in tracking flow pnp calibration mapping; do
     study=scripts/judges/study.toml
     [ $algorithm = calibration ] && study=$dir/calibration.toml
