@@ -199,12 +199,12 @@ pub enum LogError {
         /// First line of the other kind.
         line: usize,
     },
-    /// Heights are above the ground, which is not known.
+    /// Heights are above the ground, which is not known below the first row, or below more than half of the rows.
     #[error(
         "line {line}: heights are above the ground, but the terrain has no height there: use a terrain below the flight"
     )]
     NoGround {
-        /// Line of the first good row.
+        /// Line of the first row without.
         line: usize,
     },
     /// `flight.speed` is not usable.

@@ -129,6 +129,11 @@ fn rows_beyond_the_terrain_are_counted_and_a_first_one_for_take_off_is_refused()
     assert!(
         loaded.warnings.iter().any(|warning| warning.contains("10 rows beyond the heights of the terrain"))
     );
+    for (row, cells) in last.iter_mut().enumerate().skip(20) {
+        *cells = beyond(row);
+    }
+    let error = load(header, &last, "ground", &window).unwrap_err().to_string();
+    assert!(error.contains("line 22") && error.contains("terrain has no height there"), "{error}");
     let mut first = rows;
     first[0] = beyond(0);
     let error = load(header, &first, "takeoff", &window).unwrap_err().to_string();

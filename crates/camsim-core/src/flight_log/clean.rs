@@ -208,6 +208,9 @@ fn level_with_height(frame: &LocalFrame, ned_m: DVec3) -> Geodetic {
 }
 
 /// Height of the ground below each row, or below the first; empty where no heights are above it.
+///
+/// # Errors
+/// It is not known below more than half of them.
 fn ground_heights(
     usable: &[&RawRow],
     height: HeightConversion<'_>,
@@ -234,7 +237,12 @@ fn ground_heights(
         last = height_m.or(last);
         *height_m = last;
     }
-    known.into_iter().collect::<Option<Vec<f64>>>().ok_or(LogError::NoGround { line: usable[0].line })
+    let missing = &report.without_ground;
+    match missing.lines.first() {
+        // Most of the flight is elsewhere.
+        Some(&line) if 2 * missing.count > count => Err(LogError::NoGround { line }),
+        _ => Ok(known.into_iter().flatten().collect()),
+    }
 }
 
 struct Positions<'a>(&'a [CleanRow]);
