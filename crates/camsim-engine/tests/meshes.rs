@@ -47,7 +47,8 @@ fn with_alpha(side: u32) -> Texture {
     Texture { size_px: [side, side], rgba8: rgba8.collect(), encoding: Encoding::Linear }
 }
 
-/// PSNR of the picture, of gpu or cpu, that is farther from the reference's, and the fraction of pixels whose depth is another surface's.
+/// PSNR of the picture, of gpu or cpu, that is farther from the reference's, and the fraction of pixels whose depth is
+/// another surface's.
 fn compare(name: &str, meshes: Vec<Mesh>) -> (f64, f64) {
     let mut scenario = scenario();
     scenario.camera.size_px = [160, 120];

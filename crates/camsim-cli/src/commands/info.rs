@@ -68,17 +68,17 @@ fn parts(engine: &Engine) -> Vec<Part> {
         part(
             "graphics card",
             engine.adapter().is_some_and(|adapter| !adapter.limits().is_software),
-            "the processor renders, at a fraction of the rate",
+            "the processor renders",
         ),
         part(
             GRAPHICS,
             engine.adapter().is_some(),
-            "--backend gpu and `camsim viewer` do not work; what the cpu renderer does not vectorise is computed in f64",
+            "no --backend gpu and no `camsim viewer`; what the cpu renderer does not vectorise is computed in f64",
         ),
         part(
             "vector instructions",
             engine.capabilities().has_vectors,
-            "the cpu renderer is several times slower (x86-64 needs AVX2, FMA and F16C)",
+            "the cpu renderer is slow (x86-64 needs AVX2, FMA and F16C)",
         ),
         part("ffmpeg", has_ffmpeg(), "no mp4 and mkv; exr, png and y4m need nothing"),
     ];

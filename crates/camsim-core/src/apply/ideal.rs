@@ -35,7 +35,8 @@ pub enum ApplyError {
     Flow,
     /// A solver that needs a scene.
     #[error(
-        "solver \"reference\" needs a scene, which an ideal frame does not have: use \"reproject\" (exact up to what the frame shows)"
+        "solver \"reference\" needs a scene, which an ideal frame does not have: use \"reproject\" (exact up \
+         to what the frame shows)"
     )]
     Reference,
     /// Linear fog without the paper's preset.

@@ -141,7 +141,8 @@ fn time_ns(when: Node<'_, '_>) -> Result<i128, String> {
     xml::time_ns(when.text().unwrap_or("").trim(), line(when))
 }
 
-/// Refuses heights that are not above what `flight.height` says, by the mode of a geometry or of the nearest element around it.
+/// Refuses heights that are not above what `flight.height` says, by the mode of a geometry or of the nearest element
+/// around it.
 fn check_altitude_mode(node: Node<'_, '_>, spec: &FlightSpec) -> Result<(), String> {
     let of_element =
         |node: Node<'_, '_>| children(node, "altitudeMode").next()?.text().map(|text| text.trim().to_owned());
@@ -153,7 +154,8 @@ fn check_altitude_mode(node: Node<'_, '_>, spec: &FlightSpec) -> Result<(), Stri
             return Ok(());
         }
         Some(mode) if mode.eq_ignore_ascii_case("absolute") => {
-            "the altitudeMode is absolute, so the heights are above mean sea level: set flight.height = \"msl\"".to_owned()
+            "the altitudeMode is absolute, so the heights are above mean sea level: set flight.height = \"msl\""
+                .to_owned()
         }
         None => format!(
             "there is no altitudeMode, which in KML means that heights are not used (clampToGround): if they are \
