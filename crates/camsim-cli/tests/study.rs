@@ -187,6 +187,11 @@ fn a_wrong_study_is_refused_before_anything_is_rendered() {
         ("[[vary]]\nkey = \"camera.nonsense\"\nvalues = [1]\n", "camera.nonsense = 1"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = [10, -1]\n", "camera.fps = -1"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = []\n", "no values"),
+        ("export = \"eurok\"\n[[vary]]\nkey = \"camera.fps\"\nvalues = [10]\n", "is not a layout"),
+        (
+            "[[vary]]\nkey = \"camera.fps\"\nvalues = [10]\n[[vary]]\nkey = \"camera.fps\"\nvalues = [20]\n",
+            "two [[vary]] tables are of camera.fps",
+        ),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = [10, 10]\n", "two points are the same"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalue = [1]\n", "unknown field"),
         ("algorithm = \"tracking\"\n[[vary]]\nkey = \"camera.fps\"\nvalues = [1]\n", "remove one"),
@@ -204,6 +209,13 @@ fn a_wrong_study_is_refused_before_anything_is_rendered() {
     let text = fs::read_to_string(&sweep).unwrap().replace(", \"{result}\"", "");
     fs::write(&sweep, text).unwrap();
     assert!(run(&sweep, &output, &[]).2.contains("does not name {result}"));
+    let random = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/tutorial/random.toml");
+    let sweep = study(folder.path(), READOUT, VARY);
+    let text = fs::read_to_string(&sweep).unwrap();
+    let first = text.lines().next().unwrap();
+    fs::write(&sweep, text.replace(first, &format!("scenario = {random:?}"))).unwrap();
+    let (code, _, err) = run(&sweep, &output, &[]);
+    assert!(code == 2 && err.contains("has [randomize]"), "{err}");
     let sweep = study(folder.path(), "true", VARY);
     let text = fs::read_to_string(&sweep).unwrap().replace("[\"sh\"", "[\"no-such-program\"");
     fs::write(&sweep, text).unwrap();

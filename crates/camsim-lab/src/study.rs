@@ -4,7 +4,10 @@
 //! of the values; [`Numbers`] are what the command leaves for each; [`table`], [`summary`] and [`plots`] are made from
 //! them. Rendering and running are the caller's.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +19,7 @@ mod report;
 pub use algorithms::{ALGORITHMS, Algorithm, COMMON};
 pub use numbers::Numbers;
 pub use points::Point;
-pub use report::{Done, plots, summary, table};
+pub use report::{Done, is_plot, plots, summary, table};
 
 /// Why a study cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -46,7 +49,7 @@ pub struct Study {
     /// Scenario, from the study's folder on.
     pub scenario: PathBuf,
     /// What is run for each point: program and arguments. `{data}` is the folder of the frames, `{result}` the file
-    /// that it writes: JSON, or CSV where the study's `result` says so.
+    /// that it writes, JSON or CSV ([`Numbers::read`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
     /// One of [`ALGORITHMS`], instead of a command.
@@ -76,7 +79,7 @@ pub struct Study {
     /// Points one by one, instead of `vary`: the keys of each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub point: Vec<toml::Table>,
-    /// Plots; without any, each number against the first key of `vary`.
+    /// Plots; without any, each number over the first key with several numbers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub plot: Vec<PlotSpec>,
 }
@@ -115,16 +118,17 @@ fn yes() -> bool {
 }
 
 impl Study {
-    /// Reads a study.
+    /// Reads a study; `algorithm` replaces its own, or its command.
     ///
     /// # Errors
     /// [`StudyError`] names the file and the key.
-    pub fn read(path: &Path) -> Result<Self, StudyError> {
+    pub fn read(path: &Path, algorithm: Option<&str>) -> Result<Self, StudyError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| StudyError::Read { path: path.to_owned(), source })?;
         let wrong = |problem: String| StudyError::Content { path: path.to_owned(), problem };
         let study: Self =
             toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))?;
+        let study = study.with_algorithm(algorithm);
         study.problem().map_or(Ok(study), |problem| Err(wrong(problem)))
     }
 
@@ -161,27 +165,25 @@ impl Study {
         if let Some(timeout_s) = self.timeout_s.filter(|t_s| !(t_s.is_finite() && *t_s > 0.0)) {
             return Some(format!("timeout_s is {timeout_s}: give a positive number of seconds"));
         }
-        let points = self.points();
-        let keys: Vec<&str> = points.first().map_or_else(Vec::new, Point::keys);
-        let mut sorted = keys.clone();
-        sorted.sort_unstable();
-        if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Some(format!("{} has values in two places: keep one", twice[0]));
+        let is_twice = |at: &usize| self.vary[..*at].iter().any(|vary| vary.key == self.vary[*at].key);
+        if let Some(at) = (0..self.vary.len()).find(is_twice) {
+            return Some(format!("two [[vary]] tables are of {}: join their values", self.vary[at].key));
         }
+        let points = self.points();
+        let keys: BTreeSet<&str> = points.iter().flat_map(Point::keys).collect();
         self.plot.iter().find_map(|plot| {
             [Some(&plot.x), plot.by.as_ref()]
                 .into_iter()
                 .flatten()
-                .find(|key| !keys.contains(&key.as_str()))
+                .find(|key| !keys.contains(key.as_str()))
                 .map(|key| {
-                    format!("[[plot]] names {key}, which does not vary: the keys are {}", keys.join(", "))
+                    let known = keys.iter().copied().collect::<Vec<_>>().join(", ");
+                    format!("[[plot]] names {key}, which does not vary: the keys are {known}")
                 })
         })
     }
 
-    /// The study with one of camsim's algorithms instead of its own or of its command, if there is a name.
-    #[must_use]
-    pub fn with_algorithm(self, name: Option<&str>) -> Self {
+    fn with_algorithm(self, name: Option<&str>) -> Self {
         match name {
             None => self,
             Some(name) => Self { algorithm: Some(name.into()), command: Vec::new(), export: None, ..self },

@@ -11,7 +11,9 @@ use camsim_io::{
     inputs::{file_fingerprints, scenario_fingerprints},
     write::write_atomic,
 };
-use camsim_lab::study::{ALGORITHMS, Algorithm, Done, Numbers, Point, Study, plots, summary, table};
+use camsim_lab::study::{
+    ALGORITHMS, Algorithm, COMMON, Done, Numbers, Point, Study, is_plot, plots, summary, table,
+};
 
 use super::render::RenderBackend;
 use crate::{
@@ -26,6 +28,7 @@ mod command;
 mod frames;
 
 use command::Command;
+use frames::Frames;
 
 /// Run an algorithm on the frames of many scenarios
 ///
@@ -86,10 +89,11 @@ pub fn run(args: &StudyArgs, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(());
     };
     let algorithm = args.algorithm.as_deref();
-    let study = Study::read(path).or_bad_input()?.with_algorithm(algorithm);
+    let study = Study::read(path, algorithm).or_bad_input()?;
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     let output = args.output.clone().unwrap_or_else(|| default_folder(path, algorithm));
-    let runner = Runner { study: &study, folder, output: &output, args };
+    let frames = Frames::of(&study, args.backend)?;
+    let runner = Runner { study: &study, frames, folder, output: &output, args };
     let tasks = runner.tasks(console)?;
     if args.dry_run {
         for task in &tasks {
@@ -166,10 +170,14 @@ fn write_tables(
     let markdown = summary(all);
     write_atomic(&output.join("study.csv"), table(all).as_bytes()).or_failed()?;
     write_atomic(&output.join("study.md"), markdown.as_bytes()).or_failed()?;
-    // Plots of numbers and keys that the study no longer has go.
     let folder = output.join("plots");
-    let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).or_failed()?;
+    // Plots of numbers and keys that the study no longer has; other files of the folder stay.
+    for entry in fs::read_dir(&folder).or_failed()?.flatten() {
+        if is_plot(&entry.file_name().to_string_lossy()) {
+            fs::remove_file(entry.path()).or_failed()?;
+        }
+    }
     for (name, svg) in plots(study, all) {
         match svg {
             Ok(svg) => write_atomic(&folder.join(name), svg.as_bytes()).or_failed()?,
@@ -223,6 +231,7 @@ enum PointFailure {
 /// What points are run with.
 struct Runner<'a> {
     study: &'a Study,
+    frames: Frames,
     /// The study's.
     folder: &'a Path,
     output: &'a Path,
@@ -247,7 +256,7 @@ impl Runner<'_> {
         let study = self.study;
         let command = format!(
             "algorithm = {:?}\ncommand = {:?}\n{:?}\n",
-            study.algorithm().map(|algorithm| algorithm.script),
+            study.algorithm().map(|algorithm| (algorithm.script, COMMON)),
             study.command,
             // A script that changes makes other results.
             file_fingerprints(
@@ -266,9 +275,22 @@ impl Runner<'_> {
                 return Err(Failure::bad_input(anyhow!("two points are the same: {}", point.label())));
             }
             let read = read_changed(&self.scenario(), &self.changes(&point), console);
-            let rig = read.map_err(|failure| failure.of(point.label()))?.into_base();
-            let mut of_frames =
-                format!("{}\nframes = {:?}\nlayout = {:?}\n", point.label(), study.frames, study.layout());
+            let read = read.map_err(|failure| failure.of(point.label()))?;
+            if read.is_random() {
+                return Err(Failure::bad_input(anyhow!(
+                    "{} has [randomize], whose values a study would not know: remove it, and name the values in \
+                     [[vary]] or [[point]]",
+                    self.scenario().display()
+                )));
+            }
+            let rig = read.into_base();
+            let mut of_frames = format!(
+                "{}\nframes = {:?}\nlayout = {:?}\nbackend = {:?}\n",
+                point.label(),
+                study.frames,
+                study.layout(),
+                self.args.backend
+            );
             for scenario in rig.scenarios() {
                 of_frames += &serde_json::to_string(scenario).or_failed()?;
                 of_frames += &format!("\n{:?}\n", scenario_fingerprints(scenario));
@@ -304,12 +326,12 @@ impl Runner<'_> {
         let failed =
             |error: std::io::Error| PointFailure::Point(format!("{}: {error}", task.folder.display()));
         task.clear().map_err(failed)?;
-        frames::render(self, &task.point, &task.folder.join("data"), console).map_err(
-            |failure| match failure.code() {
+        self.frames
+            .render(self.scenario(), self.changes(&task.point), task.folder.join("data"), console)
+            .map_err(|failure| match failure.code() {
                 INTERRUPTED => PointFailure::Stopped,
                 _ => PointFailure::Point(failure.message()),
-            },
-        )?;
+            })?;
         let command = self.command(task);
         command.run(self.folder, self.study.timeout_s, stop).map_err(|problem| match problem {
             command::Problem::Stopped => PointFailure::Stopped,

@@ -34,7 +34,7 @@ const BOARD: &[(&str, &str)] = &[
 pub const ALGORITHMS: &[Algorithm] = &[
     Algorithm {
         name: "tracking",
-        about: "Lucas-Kanade from corners to the next picture against exact flow: error_median_px, error_rms_px, error_p90_px, lost",
+        about: "Lucas-Kanade from corners to the next picture against exact flow: error_{median,rms,p90}_px, lost",
         script: include_str!("../../algorithms/tracking.py"),
         layout: Some("flo"),
         sets: &[],
@@ -43,7 +43,7 @@ pub const ALGORITHMS: &[Algorithm] = &[
     },
     Algorithm {
         name: "flow",
-        about: "dense flow (DIS) against exact flow: error_median_px, error_rms_px, error_p90_px, flow_median_px",
+        about: "dense flow (DIS) against exact flow: error_{median,rms,p90}_px, flow_median_px",
         script: include_str!("../../algorithms/flow.py"),
         layout: Some("flo"),
         sets: &[],
@@ -52,7 +52,7 @@ pub const ALGORITHMS: &[Algorithm] = &[
     },
     Algorithm {
         name: "pnp",
-        about: "pose from a picture of scene.board against the true pose: position_*_mm, angle_*_deg (median, rms, p90)",
+        about: "pose from a picture of scene.board: position_{median,rms,p90}_mm, angle_{median,rms,p90}_deg",
         script: include_str!("../../algorithms/pnp.py"),
         layout: None,
         sets: BOARD,
@@ -70,7 +70,7 @@ pub const ALGORITHMS: &[Algorithm] = &[
     },
     Algorithm {
         name: "mapping",
-        about: "COLMAP with the true calibration: centre_rms_m, centre_percent (of the flight's length), found, reprojection_px",
+        about: "COLMAP with the true calibration: centre_rms_m, centre_percent (of the path), found, reprojection_px",
         script: include_str!("../../algorithms/mapping.py"),
         layout: Some("colmap"),
         sets: &[],

@@ -12,8 +12,8 @@ const RESERVED: [&str; 3] = ["seed", "folder", "problem"];
 pub struct Numbers(pub BTreeMap<String, f64>);
 
 impl Numbers {
-    /// Reads a result: a JSON object of numbers (of objects of objects the names are joined by dots; `null` is NaN), or a
-    /// CSV file of a header and rows of numbers, whose means count.
+    /// Reads a result: a JSON object of numbers and of such objects, whose names are joined by dots (`null` is NaN); or a
+    /// CSV file of a header and rows of numbers, whose means are taken.
     ///
     /// # Errors
     /// The file is missing or holds something else.

@@ -14,7 +14,7 @@ pub struct Point {
 }
 
 impl Study {
-    /// All points: the last key of `vary` changes first, and seeds before it.
+    /// All points, the first key of `vary` slowest, seeds fastest.
     #[must_use]
     pub fn points(&self) -> Vec<Point> {
         let mut all: Vec<Vec<(String, toml::Value)>> = match self.point.is_empty() {
@@ -82,8 +82,8 @@ impl Point {
         values.chain(seed).collect::<Vec<_>>().join(", ")
     }
 
-    /// Name of its folder: of its values alone, so that a study with more points finds those that it has. Letters of
-    /// the values come first, then a checksum of all.
+    /// Name of its folder: its values as far as a file name holds them, and their checksum. It depends on nothing else,
+    /// so that a study with more points finds those that it has.
     #[must_use]
     pub fn folder(&self) -> String {
         let label = self.label();

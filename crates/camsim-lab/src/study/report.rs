@@ -136,6 +136,12 @@ pub fn plots(study: &Study, all: &[Done]) -> Vec<(String, Result<String, PlotErr
     specs.iter().map(|spec| (file_name(spec), plot(study, spec, all).svg())).collect()
 }
 
+/// Whether a file has the name of a plot of [`plots`].
+#[must_use]
+pub fn is_plot(file: &str) -> bool {
+    file.contains("-over-") && file.ends_with(".svg")
+}
+
 fn file_name(spec: &PlotSpec) -> String {
     let by = spec.by.as_ref().map(|by| format!("-by-{by}")).unwrap_or_default();
     let plain = |c: char| if c.is_ascii_alphanumeric() || "_.-".contains(c) { c } else { '-' };
@@ -260,6 +266,7 @@ mod tests {
         let default = study(Vec::new());
         let [(name, Ok(svg))] = &plots(&default, &done(&default))[..] else { panic!("one plot") };
         assert_eq!(name, "e-over-a-by-b.svg");
+        assert!(is_plot(name) && !is_plot("own.svg"));
         assert!(svg.contains("a, ms") && svg.contains("b three"), "{svg}");
         let spec = PlotSpec { x: "a".into(), y: "e".into(), by: None, log: false };
         let curves = |study: &Study, all: &[Done], spec: &PlotSpec| plot(study, spec, all).series;

@@ -1,49 +1,55 @@
 //! The frames of a point.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::anyhow;
 use camsim_core::scenario::DatasetFormat;
+use camsim_lab::study::Study;
 
-use super::Runner;
 use crate::{
-    commands::{export, render},
+    commands::{
+        export::{self, ExportArgs},
+        render::{self, RenderArgs, RenderBackend},
+    },
     console::Console,
     failure::{Failure, OrFail},
     frame_list::FrameList,
+    inputs::Changes,
 };
-use camsim_lab::study::Point;
 
-/// Renders what is missing of a point's frames, in the layout of the study.
-pub fn render(
-    runner: &Runner<'_>,
-    point: &Point,
-    data: &Path,
-    console: &mut Console<'_>,
-) -> Result<(), Failure> {
-    let study = runner.study;
-    let frames = study.frames.as_deref().map(str::parse::<FrameList>).transpose().or_bad_input()?;
-    let (changes, backend) = (runner.changes(point), runner.args.backend);
-    match study.layout() {
-        None => {
-            let args =
-                render::RenderArgs::of_scenario(runner.scenario(), data.to_owned(), frames, changes, backend);
-            render::run(&args, console)
-        }
-        Some(name) => {
-            let format = DatasetFormat::named(name).ok_or_else(|| {
-                let known = DatasetFormat::NAMES.join(", ");
-                Failure::bad_input(anyhow!("export = \"{name}\" is not a layout: there are {known}"))
-            })?;
-            let args = export::ExportArgs::of_scenario(
-                runner.scenario(),
-                format,
-                data.to_owned(),
-                frames,
-                changes,
-                backend,
-            );
-            export::run(&args, console)
+/// Which frames a study renders, and in which layout.
+pub struct Frames {
+    list: Option<FrameList>,
+    layout: Option<DatasetFormat>,
+    backend: Option<RenderBackend>,
+}
+
+impl Frames {
+    /// Those of a study.
+    pub fn of(study: &Study, backend: Option<RenderBackend>) -> Result<Self, Failure> {
+        let list = study.frames.as_deref().map(str::parse).transpose().or_bad_input()?;
+        let layout = |name: &str| {
+            let known = DatasetFormat::NAMES.join(", ");
+            let unknown = || anyhow!("export = \"{name}\" is not a layout: there are {known}");
+            DatasetFormat::named(name).ok_or_else(unknown).or_bad_input()
+        };
+        Ok(Self { list, layout: study.layout().map(layout).transpose()?, backend })
+    }
+
+    /// Renders what is missing of a scenario's frames.
+    pub fn render(
+        &self,
+        scenario: PathBuf,
+        changes: Changes,
+        data: PathBuf,
+        console: &mut Console<'_>,
+    ) -> Result<(), Failure> {
+        let (list, backend) = (self.list.clone(), self.backend);
+        match self.layout {
+            None => render::run(&RenderArgs::of_scenario(scenario, data, list, changes, backend), console),
+            Some(layout) => {
+                export::run(&ExportArgs::of_scenario(scenario, layout, data, list, changes, backend), console)
+            }
         }
     }
 }
