@@ -4,15 +4,13 @@ use std::sync::Arc;
 
 use anyhow::anyhow;
 use camsim_core::{
-    deferred_photometric::DeferredPhotometric,
-    imaging::{ImageSensor, Optics},
     reference::{ReferenceRenderer, RenderOptions},
-    scenario::{Auto, Preset, Primary, Scenario, Solver},
+    scenario::{Auto, Preset, Scenario, Solver},
     scene::LodSelection,
     sequence::Sequence,
     validate::validate,
 };
-use camsim_engine::{Engine, Finished, FrameTimes, Session, join_parts};
+use camsim_engine::{CameraReference, Engine, Finished, FrameTimes, Session};
 use camsim_io::write::WriteError;
 use camsim_plan::{FramePlan, PlanError, Planner};
 
@@ -139,12 +137,7 @@ const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 /// would choose it.
 #[derive(Debug)]
 pub struct ReferenceSource {
-    /// One; or one a face, or one of each colour of each face.
-    references: Vec<ReferenceRenderer>,
-    /// These three are for what parts are joined to; a single reference has its own.
-    late: Option<DeferredPhotometric>,
-    optics: Option<Optics>,
-    sensor: Option<ImageSensor>,
+    reference: CameraReference,
     planner: Planner,
     options: RenderOptions,
 }
@@ -166,16 +159,8 @@ impl ReferenceSource {
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
             ..RenderOptions::default()
         };
-        let parts = match planner.lanes() {
-            1 => vec![sequence.clone()],
-            lanes => (0..lanes).flat_map(|lane| colors(planner.lane(lane).sequence())).collect(),
-        };
-        let references =
-            parts.into_iter().map(ReferenceRenderer::new).collect::<Result<_, _>>().or_bad_input()?;
-        let sensor = ImageSensor::new(&scenario.camera, scenario.seed);
-        let late = DeferredPhotometric::new(sequence);
-        let optics = Optics::new(&scenario.camera, scenario.seed);
-        Ok(Self { references, late, optics, sensor, planner, options })
+        let reference = CameraReference::new(sequence.clone(), &options.channels).or_bad_input()?;
+        Ok(Self { reference, planner, options })
     }
 
     fn finished(&self, reference: &ReferenceRenderer, plan: FramePlan) -> Finished {
@@ -188,14 +173,6 @@ impl ReferenceSource {
             out_of_order: 0,
             times: FrameTimes::default(),
         }
-    }
-}
-
-/// The sequences of all colours of a face, whose borders are where each colour's lens has them.
-fn colors(face: &Arc<Sequence>) -> Vec<Arc<Sequence>> {
-    match face.scenario.camera.is_chromatic() {
-        true => Primary::ALL.map(|primary| Arc::new(face.primary(primary))).into(),
-        false => vec![face.clone()],
     }
 }
 
@@ -229,7 +206,7 @@ impl FrameSource for ReferenceSource {
         for &frame in frames {
             let plans = self.planner.plans(frame).or_bad_input()?;
             if let [plan] = plans.as_slice() {
-                sink(self.finished(&self.references[0], plan.clone())).or_failed()?;
+                sink(self.finished(&self.reference.parts()[0], plan.clone())).or_failed()?;
                 continue;
             }
             let rows = plans.first().map(|plan| self.planner.rows(plan)).unwrap_or_default();
@@ -237,20 +214,10 @@ impl FrameSource for ReferenceSource {
                 let others: Vec<FramePlan> = plan.other_colors().collect();
                 std::iter::once(plan).chain(others)
             });
-            let parts =
-                self.references.iter().zip(plans).map(|(reference, plan)| self.finished(reference, plan));
-            if let Some(mut whole) = join_parts(parts) {
+            let parts = self.reference.parts().iter().zip(plans);
+            let parts = parts.map(|(reference, plan)| self.finished(reference, plan));
+            if let Some(mut whole) = self.reference.joined(parts) {
                 whole.frame.rows = rows;
-                let exposure = whole.plan.exposure;
-                if let Some(late) = &self.late {
-                    late.finish(&mut whole.frame, exposure.as_ref());
-                }
-                if let Some(optics) = &self.optics {
-                    optics.expose(&mut whole.frame, exposure.as_ref());
-                }
-                if let Some(sensor) = &self.sensor {
-                    sensor.expose(&mut whole.frame, whole.plan.stamp_s, exposure.as_ref());
-                }
                 sink(whole).or_failed()?;
             }
         }

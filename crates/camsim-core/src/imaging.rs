@@ -29,6 +29,7 @@ use crate::{
     timing_faults::picture_of,
 };
 
+pub use demosaic::color_at;
 pub use draw::{Draws, LARGE_MEAN, two_words};
 pub use facts::{Fact, facts, with_facts};
 pub use levels::{SensorLevels, sensor_levels};

@@ -72,8 +72,7 @@ pub(crate) fn turn_to_camera_axes(frame: &mut RenderedFrame, plan: &FramePlan) {
 
 /// The frame that faces and colours make, each rendered as a camera of its own; `None` of none. Its rows are those
 /// of the first.
-#[must_use]
-pub fn join_parts(parts: impl IntoIterator<Item = Finished>) -> Option<Finished> {
+pub(crate) fn join_parts(parts: impl IntoIterator<Item = Finished>) -> Option<Finished> {
     let mut whole: Option<Finished> = None;
     for mut part in parts {
         turn_to_camera_axes(&mut part.frame, &part.plan);
@@ -98,10 +97,15 @@ pub(crate) fn add_part(whole: &mut Option<Finished>, mut part: Finished) {
 /// The frame of all parts: pixels are black where the lens of truth has no ray.
 pub(crate) fn joined(mut whole: Finished) -> Finished {
     if whole.plan.primary.is_some() {
-        let invalid = whole.frame.color_rgba_mut().par_chunks_exact_mut(4).filter(|rgba| rgba[3] == 0.0);
-        invalid.for_each(|rgba| rgba.fill(0.0));
+        blacken_invalid(whole.frame.color_rgba_mut());
     }
     whole
+}
+
+/// Leaves nothing of pixels without a ray.
+pub(crate) fn blacken_invalid(color_rgba: &mut [f32]) {
+    let invalid = color_rgba.par_chunks_exact_mut(4).filter(|rgba| rgba[3] == 0.0);
+    invalid.for_each(|rgba| rgba.fill(0.0));
 }
 
 /// Leaves a pixel one of its colours.
@@ -113,17 +117,17 @@ fn add(whole: &mut Finished, part: Finished) {
     let Finished { frame, plan, lod: _, out_of_order, times, faces } = part;
     let held: Vec<bool> = frame.color_rgba().par_chunks_exact(4).map(|rgba| rgba[3] > 0.0).collect();
     let into = &mut whole.frame;
-    if let Some(primary) = plan.primary {
-        copy_color(into.color_rgba_mut(), frame.color_rgba(), primary);
-    }
+    copy_part(into.color_rgba_mut(), frame.color_rgba(), plan.primary);
     whole.times.add(&times);
     if matches!(plan.primary, Some(Primary::Red | Primary::Blue)) {
         return;
     }
     for Plane { channel, values } in &frame.planes {
         // Coordinates are in each part's own frame.
-        let is_done = *channel == Channel::Coords || (*channel == Channel::Color && plan.primary.is_some());
-        let Some(into) = into.values_mut(*channel).filter(|_| !is_done) else { continue };
+        if matches!(channel, Channel::Coords | Channel::Color) {
+            continue;
+        }
+        let Some(into) = into.values_mut(*channel) else { continue };
         match (into, values) {
             (PlaneValues::Float(into), PlaneValues::Float(from)) => copy(into, from, &held),
             (PlaneValues::Index(into), PlaneValues::Index(from)) => copy(into, from, &held),
@@ -135,11 +139,14 @@ fn add(whole: &mut Finished, part: Finished) {
     whole.faces.extend(faces);
 }
 
-/// Copies a colour of the pixels that have it; green, whose lens is that of truth, says which are valid.
-fn copy_color(into: &mut [f32], from: &[f32], primary: Primary) {
-    let k = primary.channel();
-    into.par_chunks_exact_mut(4).zip(from.par_chunks_exact(4)).for_each(|(into, from)| {
-        if from[3] > 0.0 {
+/// Copies the pixels that a part has, R G B A: all of them, or one colour; green, whose lens is that of truth, says
+/// which are valid.
+pub(crate) fn copy_part(into: &mut [f32], from: &[f32], primary: Option<Primary>) {
+    let held = into.par_chunks_exact_mut(4).zip(from.par_chunks_exact(4)).filter(|(_, from)| from[3] > 0.0);
+    held.for_each(|(into, from)| match primary {
+        None => into.copy_from_slice(from),
+        Some(primary) => {
+            let k = primary.channel();
             into[k] = from[k];
             if primary == Primary::Green {
                 into[3] = from[3];

@@ -21,10 +21,12 @@
 //! * [`Engine`]: the renderers of this machine ([`camsim_plan::Backend`]).
 //! * [`Session`]: one sequence.
 //! * [`Finished`]: a frame with its plan and times.
+//! * [`CameraReference`]: exact rays of the same camera.
 //! * [`verify`]: measured errors of frames beside the predicted ones.
 
 #![warn(missing_docs)]
 
+mod camera_reference;
 mod engine;
 mod error;
 mod finished;
@@ -36,7 +38,9 @@ mod prepare_ahead;
 mod session;
 mod truth;
 pub mod verify;
+mod whole_frame;
 
+pub use camera_reference::CameraReference;
 #[cfg(feature = "gpu")]
 pub use camsim_gpu::GpuContext;
 pub use camsim_plan::{
@@ -46,7 +50,6 @@ pub use camsim_plan::{
 pub use engine::{Engine, adapters};
 pub use error::RenderError;
 pub use finished::{Finished, FrameTimes};
-pub use lane::join_parts;
 pub use memory::peak_memory_mb;
 pub use moving::{MOVING_RAYS, SMALL_LAMP_PX};
 pub use session::Session;

@@ -3,10 +3,8 @@
 use std::{collections::VecDeque, sync::Arc, time::Instant};
 
 use camsim_core::{
-    deferred_photometric::DeferredPhotometric,
     frame::{Plane, RenderedFrame},
-    imaging::{ImageSensor, Optics},
-    scenario::{Channel, Preset, Primary, Scenario},
+    scenario::{Channel, Preset, Primary},
     scene::{LodSelection, SceneBatches},
     sequence::Sequence,
 };
@@ -29,6 +27,7 @@ use crate::{
     planner_threads,
     prepare_ahead::{Job, PrepareAhead, Prepared, Preparer, ms_since},
     truth::{FramePixels, hits, planes},
+    whole_frame::WholeFrame,
 };
 
 /// One sequence on the renderers of an engine.
@@ -47,9 +46,7 @@ pub struct Session<'a> {
     channels: Vec<Channel>,
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
-    optics: Option<Optics>,
-    late: Option<DeferredPhotometric>,
-    sensor: Option<ImageSensor>,
+    stages: WholeFrame,
 }
 
 /// Location of the ideal frame of a frame in flight.
@@ -94,10 +91,7 @@ impl<'a> Session<'a> {
             .adapter()
             .map(|adapter| adapter.session(&still, meshes.clone(), planner.wants_truth()))
             .transpose()?;
-        let Scenario { camera, seed, .. } = &still.scenario;
-        let optics = Optics::new(camera, *seed);
-        let sensor = ImageSensor::new(camera, *seed);
-        let late = DeferredPhotometric::new(&still);
+        let stages = WholeFrame::new(&still);
         let mut cpu = CpuRenderer::new(still, meshes);
         cpu.set_leaves_truth(true);
         Ok(Self {
@@ -111,9 +105,7 @@ impl<'a> Session<'a> {
             looks_up_coords: false,
             channels: channels.into(),
             hits: Vec::new(),
-            optics,
-            late,
-            sensor,
+            stages,
         })
     }
 
@@ -143,10 +135,7 @@ impl<'a> Session<'a> {
         if let Some(gpu) = &mut self.gpu {
             gpu.renew((before, self.planner.wants_truth()), &still, planner.wants_truth())?;
         }
-        let Scenario { camera, seed, .. } = &still.scenario;
-        self.optics = Optics::renewed(self.optics.take(), camera, *seed);
-        self.sensor = ImageSensor::renewed(self.sensor.take(), camera, *seed);
-        self.late = DeferredPhotometric::new(&still);
+        self.stages.renew(&still);
         self.cpu.renew(still);
         self.lanes = lanes(&planner, scene_planner.as_deref(), moving, &self.lanes);
         self.planner = planner;
@@ -249,7 +238,11 @@ impl<'a> Session<'a> {
                 let is_last = next.is_none();
                 if let Some(done) = std::mem::replace(&mut in_flight, next)
                     && let Err(fault) = self.finish(done).map_err(RenderError::lift).and_then(|done| {
-                        let whole = parts.add(done).map(|whole| self.exposed(whole));
+                        let whole = parts.add(done).map(|mut whole| {
+                            let exposure = whole.plan.exposure;
+                            self.stages.finish(&mut whole.frame, whole.plan.stamp_s, exposure.as_ref());
+                            whole
+                        });
                         whole.map_or(Ok(()), &mut *sink).map_err(RenderError::Sink)
                     })
                 {
@@ -374,22 +367,6 @@ impl<'a> Session<'a> {
             out_of_order = submitted.out_of_order;
         }
         Ok(Finished { frame, plan, faces: Vec::new(), lod, out_of_order, times })
-    }
-
-    /// What is made of the light of a whole frame: weights of colours, the lens's blur, the image sensor, where
-    /// the camera states them.
-    fn exposed(&self, mut whole: Finished) -> Finished {
-        let exposure = whole.plan.exposure;
-        if let Some(late) = &self.late {
-            late.finish(&mut whole.frame, exposure.as_ref());
-        }
-        if let Some(optics) = &self.optics {
-            optics.expose(&mut whole.frame, exposure.as_ref());
-        }
-        if let Some(sensor) = &self.sensor {
-            sensor.expose(&mut whole.frame, whole.plan.stamp_s, whole.plan.exposure.as_ref());
-        }
-        whole
     }
 
     /// The frame with its truth.

@@ -69,5 +69,6 @@ pub use ir::{
 pub use planner::Planner;
 pub use source_error::pixel_truth::{FrameRays, PHASES, PixelHit, PixelTruth};
 pub use tracks::Tracks;
+pub use view::faces::faces;
 pub use view::lens_reach::LensReach;
 pub use view::surfaces::Among;

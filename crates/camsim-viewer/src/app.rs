@@ -71,6 +71,7 @@ impl Viewer {
         exporter: Option<Exporter>,
     ) -> Self {
         panes::tooltips::configure(context);
+        panes::colors::install(context);
         fonts::install(context);
         let repaint = context.clone();
         let engine = EngineHandle::start(move || repaint.request_repaint());
@@ -113,6 +114,7 @@ impl Viewer {
         push_dropped_files(&context, &mut out);
         self.guard_close(&context, &mut out);
         out.extend(self.state.poll_file_dialog());
+        self.state.note_pending();
         panes::show(ui, &self.state, &mut out);
         // After the edits, which clear the rejected input before.
         out.sort_by_key(|message| matches!(message, Message::InputRejected(_)));
@@ -178,8 +180,8 @@ impl Viewer {
     fn schedule_repaint(&self, context: &egui::Context) {
         if self.state.timeline.playing {
             context.request_repaint_after(PLAY_INTERVAL);
-        } else if let Some(idle_s) = self.state.idle_in_s() {
-            context.request_repaint_after_secs(idle_s as f32 + 0.001);
+        } else if let Some(wake_in_s) = self.state.wake_in_s() {
+            context.request_repaint_after_secs(wake_in_s as f32 + 0.001);
         }
     }
 }

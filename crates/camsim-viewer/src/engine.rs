@@ -10,6 +10,7 @@ mod error_overlay;
 mod mailbox;
 mod messages;
 mod picture;
+mod raw;
 mod reference;
 mod scenario_cache;
 mod variants;
@@ -24,12 +25,13 @@ use std::{
     thread::JoinHandle,
 };
 
-pub use error_overlay::{DECADES, ErrorOverlay};
+pub use error_overlay::{ABOVE_BOUND, DECADES, ErrorOverlay};
 pub use mailbox::Mailbox;
 pub use messages::{
     DepthPicture, FrameReply, FrameRequest, ReferencePicture, ReferenceRequest, Reply, Size, Stage,
 };
 pub use picture::{Difference, Picture, ramp};
+pub use raw::{BARS, Histogram, RawScale};
 use scenario_cache::ScenarioCache;
 pub use variants::{preview_factor, stage_scenario};
 

@@ -2,15 +2,16 @@
 
 use std::{sync::Arc, time::Instant};
 
-use camsim_core::{flight_log::FlightLog, reference::ReferenceRenderer, sequence::Sequence};
+use camsim_core::{flight_log::FlightLog, frame::RawPicture, reference::RaySample, sequence::Sequence};
+use camsim_engine::CameraReference;
 use camsim_io::load::Loaded;
-use camsim_plan::FramePlan;
 use eframe::egui;
 
 use crate::{
     display_image::DisplayImage,
     engine::{
-        DepthPicture, Difference, ErrorOverlay, FrameReply, Picture, ReferencePicture, Reply, Size, Stage,
+        DepthPicture, Difference, ErrorOverlay, FrameReply, Histogram, Picture, RawScale, ReferencePicture,
+        Reply, Size, Stage,
     },
 };
 
@@ -33,7 +34,7 @@ pub struct EngineState {
     /// The last rendered frame.
     pub shown: Option<ShownFrame>,
     /// Exact rays for single pixels.
-    pub reference: Option<Arc<ReferenceRenderer>>,
+    pub reference: Option<Arc<CameraReference>>,
     /// The reference's picture of a whole frame.
     pub reference_picture: Option<ShownReferencePicture>,
     /// The last fault; cleared by the next frame.
@@ -54,6 +55,8 @@ pub struct ShownFrame {
     pub difference: Option<DisplayImage>,
     /// One depth image for each picture, if requested.
     pub depths: Vec<DisplayImage>,
+    /// One raw image for each picture, if requested; `None` for a stage without sensor.
+    pub raws: Vec<Option<DisplayImage>>,
     /// One image of predicted errors for each picture, if requested and already computed.
     pub errors: Vec<DisplayImage>,
 }
@@ -79,12 +82,24 @@ pub struct StagePicture<'a> {
     pub color_rgba: &'a [f32],
     /// The stage that it shows.
     pub stage: Stage,
-    /// The plan that it was rendered by; the reference has none.
-    pub plan: Option<&'a FramePlan>,
+    /// The rendered picture; the reference's has no plan.
+    pub rendered: Option<&'a Arc<Picture>>,
+    /// The raw picture of the sensor, if requested.
+    pub raw: Option<&'a DisplayImage>,
+    /// Histogram, if requested.
+    pub histogram: Option<&'a Histogram>,
     /// Predicted error per image cell and its image, if requested.
     pub errors: Option<(&'a ErrorOverlay, &'a DisplayImage)>,
     /// Depth and its image, if requested; the reference's picture has none.
     pub depth: Option<(&'a DepthPicture, &'a DisplayImage)>,
+}
+
+impl StagePicture<'_> {
+    /// The numbers of the image sensor, and how to read them; `None` for a stage without sensor.
+    pub fn raw_numbers(&self) -> Option<(RawScale, &RawPicture)> {
+        let picture = self.rendered?;
+        Some((picture.raw_scale?, picture.frame.raw()?))
+    }
 }
 
 impl EngineState {
@@ -159,7 +174,9 @@ impl EngineState {
                 size_px,
                 color_rgba: &picture.color_rgba,
                 stage,
-                plan: None,
+                rendered: None,
+                raw: None,
+                histogram: None,
                 errors: None,
                 depth: None,
             });
@@ -169,7 +186,17 @@ impl EngineState {
         let (size_px, color_rgba) = (picture.frame.size_px, picture.frame.color_rgba());
         let errors = shown.reply.errors.get(index).map(|errors| &**errors).zip(shown.errors.get(index));
         let depth = shown.reply.depths.get(index).map(|depth| &**depth).zip(shown.depths.get(index));
-        Some(StagePicture { image, size_px, color_rgba, stage, plan: Some(&picture.plan), errors, depth })
+        Some(StagePicture {
+            image,
+            size_px,
+            color_rgba,
+            stage,
+            rendered: Some(picture),
+            raw: shown.raws.get(index).and_then(Option::as_ref),
+            histogram: shown.reply.histograms.get(index),
+            errors,
+            depth,
+        })
     }
 
     /// Path time of a frame's stamp, seconds.
@@ -177,11 +204,10 @@ impl EngineState {
         Some(self.sequence()?.stamp_s(frame as f64))
     }
 
-    /// The surface point that a pixel of the shown frame sees; `None` for the sky, and until the reference is
-    /// ready.
-    pub fn point_ned_m(&self, pixel: [u32; 2]) -> Option<glam::DVec3> {
+    /// What a pixel of the shown frame sees; `None` without ray, and until the reference is ready.
+    pub fn sample(&self, pixel: [u32; 2]) -> Option<RaySample> {
         let (reference, shown) = (self.current_reference()?, self.shown.as_ref()?);
-        reference.sample(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
+        reference.sample(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)
     }
 
     /// The first picture of the shown frame.
@@ -197,7 +223,7 @@ impl EngineState {
     }
 
     /// The reference, if it is of the loaded sequence.
-    pub fn current_reference(&self) -> Option<&Arc<ReferenceRenderer>> {
+    pub fn current_reference(&self) -> Option<&Arc<CameraReference>> {
         self.reference.as_ref().filter(|reference| self.is_current(reference.sequence()))
     }
 
@@ -222,6 +248,7 @@ impl ShownFrame {
         let (old, old_difference, old_depths, old_errors) = before.map_or_else(Default::default, |before| {
             (before.images, before.difference, before.depths, before.errors)
         });
+        let raw = |image: &Arc<egui::ColorImage>| DisplayImage::new(context, "raw", image.clone(), None);
         let pictures = reply.pictures.iter().map(|picture| &picture.image);
         let difference = reply.difference.as_ref().map(|difference| {
             DisplayImage::new(context, "difference", difference.image.clone(), old_difference)
@@ -234,6 +261,7 @@ impl ShownFrame {
                 old_depths,
                 context,
             ),
+            raws: reply.raws.iter().map(|image| image.as_ref().map(raw)).collect(),
             errors: display_images(
                 "predicted error",
                 reply.errors.iter().map(|errors| &errors.image),

@@ -34,6 +34,8 @@ pub fn render_headless(scenario: &Path, frame: u64) -> anyhow::Result<HeadlessFr
         stages: vec![Stage::Photometric],
         size: Size::Full,
         depth: false,
+        raw: false,
+        histogram: false,
         errors: false,
         gain: None,
     });

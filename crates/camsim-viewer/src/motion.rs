@@ -2,12 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use camsim_core::{
-    camera::CameraModel,
-    pose::CameraPose,
-    reference::{RaySample, ReferenceRenderer},
-    scenario::CameraSpec,
-};
+use camsim_core::{camera::CameraModel, pose::CameraPose, reference::RaySample, scenario::CameraSpec};
+use camsim_engine::CameraReference;
 use glam::{DVec2, DVec3};
 
 /// Columns and rows of the grid of pixels whose motion is shown.
@@ -27,12 +23,12 @@ pub struct PixelPath {
 }
 
 /// Motion of a grid of pixels over a frame. The last result is cached, since it is drawn in each pass.
-pub fn grid_paths(reference: &Arc<ReferenceRenderer>, frame: u64) -> Arc<Vec<PixelPath>> {
-    type PathCache = Option<(Weak<ReferenceRenderer>, u64, Arc<Vec<PixelPath>>)>;
+pub fn grid_paths(reference: &Arc<CameraReference>, frame: u64) -> Arc<Vec<PixelPath>> {
+    type PathCache = Option<(Weak<CameraReference>, u64, Arc<Vec<PixelPath>>)>;
     static CACHE: Mutex<PathCache> = Mutex::new(None);
     let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
     let is_same =
-        |(cached_reference, cached_frame, _): &&(Weak<ReferenceRenderer>, u64, Arc<Vec<PixelPath>>)| {
+        |(cached_reference, cached_frame, _): &&(Weak<CameraReference>, u64, Arc<Vec<PixelPath>>)| {
             *cached_frame == frame && std::ptr::eq(cached_reference.as_ptr(), Arc::as_ptr(reference))
         };
     if let Some((_, _, paths)) = cache.as_ref().filter(is_same) {
@@ -50,7 +46,7 @@ pub fn grid_paths(reference: &Arc<ReferenceRenderer>, frame: u64) -> Arc<Vec<Pix
 }
 
 /// Motion of the point that one pixel sees; `None` if the pixel has no ray.
-pub fn pixel_path(reference: &ReferenceRenderer, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
+pub fn pixel_path(reference: &CameraReference, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
     let sample = reference.sample(frame, pixel, DVec2::ZERO, 0.0)?;
     let sequence = reference.sequence();
     let camera = camera_model(&sequence.scenario.camera)?;
@@ -90,6 +86,5 @@ pub fn project(camera: &CameraModel, pose: &CameraPose, sample: &RaySample) -> O
         None => sample.pose.ned_from_camera * sample.uv.extend(1.0),
     };
     let ray_camera: DVec3 = pose.ned_from_camera.conjugate() * ray_ned;
-    let uv = (ray_camera.z > 0.0).then(|| ray_camera.truncate() / ray_camera.z)?;
-    camera.lens.contains(uv).then(|| camera.project(uv))
+    camera.lens.contains_ray(ray_camera).then(|| camera.project_ray(ray_camera))
 }

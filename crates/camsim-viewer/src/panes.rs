@@ -1,5 +1,6 @@
 //! Panes: they draw from the state and push messages. None of them uses the device or waits.
 
+pub(crate) mod colors;
 mod export;
 mod image_view;
 mod inspector;
@@ -46,7 +47,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
             .resizable(true)
             .default_size(300.0)
             .size_range(180.0..=(0.4 * width).clamp(180.0, 600.0))
-            .show(ui, |ui| parameters::show(ui, state, out));
+            .show(ui, |ui| widgets::within_panel(ui, |ui| parameters::show(ui, state, out)));
     }
     if width >= MIN_WIDTH_PAGES {
         egui::Panel::right("pages")
@@ -54,7 +55,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
             .resizable(true)
             .default_size(330.0)
             .size_range(220.0..=(0.4 * width).clamp(220.0, 700.0))
-            .show(ui, |ui| pages(ui, state, out));
+            .show(ui, |ui| widgets::within_panel(ui, |ui| pages(ui, state, out)));
     }
     egui::CentralPanel::default()
         .frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT))

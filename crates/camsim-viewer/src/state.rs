@@ -26,6 +26,8 @@ pub(crate) mod dropped_files;
 pub const IDLE_S: f64 = 0.2;
 /// Render time of a full frame above which play shows previews, ms.
 const PREVIEW_ABOVE_MS: f64 = 60.0;
+/// Time after which a missing picture is marked, seconds.
+const MARK_AFTER_S: f64 = 0.3;
 /// How long a status message is shown, seconds.
 const STATUS_S: f64 = 6.0;
 /// Length of the list of recent files.
@@ -89,6 +91,8 @@ pub struct State {
     now_s: f64,
     /// egui's time of the last input, seconds.
     last_input_s: f64,
+    /// egui's time since when the wanted picture has not been shown, seconds.
+    pending_since_s: Option<f64>,
 }
 
 impl State {
@@ -113,6 +117,13 @@ impl State {
         self.now_s = now_s;
         self.status.take_if(|status| status.until_s <= now_s);
         self.timeline.advance(seconds);
+    }
+
+    /// Notes whether the wanted picture is shown; play wants another one all the time.
+    pub fn note_pending(&mut self) {
+        let is_pending = self.is_pending() && !(self.timeline.playing && self.engine.fault.is_none());
+        let since_s = self.pending_since_s.unwrap_or(self.now_s);
+        self.pending_since_s = is_pending.then_some(since_s);
     }
 
     /// Records an input at the present time.
@@ -152,23 +163,37 @@ impl State {
                 self.document.as_ref().is_none_or(|document| *document.scenario != loaded.sequence.scenario)
             }
             Reply::Frame(reply) => {
-                let (Some(request), Some(shown)) = (self.frame_request(), &self.engine.shown) else {
+                let (Some(wanted), Some(shown)) = (self.frame_request(), &self.engine.shown) else {
                     return false;
                 };
-                match reply.request.size {
-                    Size::Full => {
-                        let full_request = FrameRequest {
-                            size: Size::Full,
-                            errors: reply.request.errors,
-                            ..request.clone()
-                        };
-                        request.size == Size::Preview && full_request != reply.request
-                    }
-                    Size::Preview => shown.reply.request == request,
+                let shown = &shown.reply.request;
+                match (reply.request.is_same_frame(&wanted), shown.is_same_frame(&wanted)) {
+                    (true, true) => reply.request.size == Size::Preview && *shown == wanted,
+                    (true, false) => false,
+                    (false, true) => true,
+                    // Play shows full frames as they come; else a full frame that is not wanted any more took so
+                    // long that previews of later ones are shown.
+                    (false, false) => reply.request.size == Size::Full && !self.timeline.playing,
                 }
             }
             _ => false,
         }
+    }
+
+    /// Whether the shown picture is not the wanted one: of another frame or scenario, or a preview.
+    pub fn is_pending(&self) -> bool {
+        let shown = self.engine.shown.as_ref().map(|shown| &shown.reply.request);
+        match (self.frame_request(), shown) {
+            (Some(wanted), Some(shown)) => !shown.is_same_frame(&wanted) || shown.size != wanted.size,
+            (wanted, _) => wanted.is_some(),
+        }
+    }
+
+    /// Seconds for which the wanted picture has been missing; `None` if it is shown, or has not been missing long
+    /// enough to say so.
+    pub fn pending_s(&self) -> Option<f64> {
+        let since_s = self.pending_since_s?;
+        Some(self.now_s - since_s).filter(|pending_s| *pending_s >= MARK_AFTER_S)
     }
 
     /// What the renderer should render now.
@@ -188,6 +213,8 @@ impl State {
             stages,
             size,
             depth: self.view.overlays.depth,
+            raw: self.view.overlays.raw,
+            histogram: self.view.overlays.histogram,
             errors: size == Size::Full && self.shows_errors(),
         })
     }
@@ -216,6 +243,13 @@ impl State {
                 against,
             }
         })
+    }
+
+    /// Seconds until input counts as idle or a missing picture is marked, whichever comes first; `None` if neither
+    /// is to come.
+    pub fn wake_in_s(&self) -> Option<f64> {
+        let mark_s = self.pending_since_s.map(|since_s| since_s + MARK_AFTER_S - self.now_s);
+        [self.idle_in_s(), mark_s].into_iter().flatten().filter(|in_s| *in_s > 0.0).reduce(f64::min)
     }
 
     /// Applies a message of a pane.

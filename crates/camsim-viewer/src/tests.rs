@@ -10,6 +10,8 @@ mod pages;
 mod pane_snapshots;
 mod pictures;
 mod scrubbing;
+mod sensor;
 mod unsaved_changes;
 mod value_ranges;
 mod view3d;
+mod wide;

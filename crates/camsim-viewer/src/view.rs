@@ -35,6 +35,7 @@ impl Compare {
 
 /// Overlays of pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Overlays {
     /// Invalid pixels in red, as in the paper.
     pub invalid: bool,
@@ -48,6 +49,10 @@ pub struct Overlays {
     pub error: bool,
     /// Depth instead of colour.
     pub depth: bool,
+    /// The raw picture of the sensor instead of colour.
+    pub raw: bool,
+    /// Histogram.
+    pub histogram: bool,
 }
 
 /// Pages of the right panel.

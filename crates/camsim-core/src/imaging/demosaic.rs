@@ -24,7 +24,7 @@ const RGBW: [[u8; RGBW_SIDE]; RGBW_SIDE] = [
     [GREEN, WHITE, RED, WHITE],
 ];
 
-/// Colour that a pixel measures.
+/// Colour that a pixel measures: 0, 1, 2 for red, green, blue, 3 for white.
 #[must_use]
 pub fn color_at(mosaic: Mosaic, [x, y]: [u32; 2]) -> u8 {
     let of_two_by_two = |colors: [u8; 4]| colors[(2 * (y & 1) + (x & 1)) as usize];

@@ -42,8 +42,8 @@ pub struct RenderOptions {
     pub photometric: bool,
     /// Ideal frame to which the source coordinates of [`Channel::Coords`] refer. Without one they are 0.
     pub key: Option<IdealView>,
-    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all. With
-    /// `[camera.point_spread]` the frame is not exposed then ([`ReferenceRenderer::expose`]).
+    /// Mask of the pixels to render, row-major; the others stay invalid. `None` renders all. The optics and the
+    /// image sensor of the camera need whole frames: with a mask, they are left to [`ReferenceRenderer::expose`].
     pub only: Option<Vec<bool>>,
 }
 
@@ -173,15 +173,14 @@ impl ReferenceRenderer {
             rows: self.row_records(frame),
             planes,
         };
-        if options.photometric && !(self.optics.is_some() && options.only.is_some()) {
+        if options.photometric && options.only.is_none() {
             self.expose(&mut rendered);
         }
         (rendered, convergence)
     }
 
-    /// Applies the optics and the image sensor of the camera to the light of a frame, as [`ReferenceRenderer::render`]
-    /// does at its end. With `[camera.point_spread]` it leaves that out for a part of the pixels, as light
-    /// comes from all.
+    /// Applies the optics and the image sensor of the camera to the light of a whole frame, as
+    /// [`ReferenceRenderer::render`] does at its end unless [`RenderOptions::only`] masks pixels.
     pub fn expose(&self, frame: &mut RenderedFrame) {
         let exposure = self.sequence.exposure(frame.index);
         if let Some(optics) = &self.optics {

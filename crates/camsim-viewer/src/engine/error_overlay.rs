@@ -7,12 +7,14 @@ use eframe::egui::{Color32, ColorImage};
 
 use super::picture::{Picture, ramp};
 
-/// Decades below the largest error that the colour scale covers.
+/// Decades below the bound on 99 % of the pixels that the colour scale covers.
 pub const DECADES: f64 = 2.0;
 /// Fraction of a coloured pixel's brightness that comes from the picture.
 const PICTURE_SHARE: f32 = 0.4;
 /// Brightness of pixels without predicted error, as a fraction of the picture's.
 const GREY_SHARE: f32 = 0.45;
+/// Colour of errors above the bound: those of 1 % of the pixels.
+pub const ABOVE_BOUND: [u8; 3] = [235, 60, 60];
 
 /// Predicted source errors of one picture.
 #[derive(Debug)]
@@ -24,22 +26,32 @@ pub struct ErrorOverlay {
 }
 
 impl ErrorOverlay {
-    /// Tints `picture` by `map`.
-    pub fn new(picture: &Picture, map: ErrorMap) -> Self {
-        let image = Arc::new(tinted(&picture.image, &map));
+    /// Tints `picture` by the maps of its faces.
+    pub fn new(picture: &Picture, maps: Vec<ErrorMap>) -> Self {
+        let map = joined(maps);
+        let image = Arc::new(tinted(&picture.image, &map, picture.predicted_px()));
         Self { map, image }
     }
 }
 
-/// Position on the colour scale, 0 to 1, which is logarithmic and ends at `largest_px`.
-fn scale_position(px: f64, largest_px: f64) -> f64 {
-    (1.0 + (px / largest_px).log10() / DECADES).clamp(0.0, 1.0)
+/// One map of those of several faces, each of which has probes in its own pixels.
+fn joined(maps: Vec<ErrorMap>) -> ErrorMap {
+    let empty = ErrorMap { pixels: Vec::new(), everywhere_px: 0.0, grid: [1, 1], reach_px: 0.0 };
+    maps.into_iter().fold(empty, |mut all, map| {
+        all.pixels.extend(map.pixels);
+        ErrorMap { everywhere_px: all.everywhere_px.max(map.everywhere_px), pixels: all.pixels, ..map }
+    })
 }
 
-fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
+/// Colour of an error: on a logarithmic scale that ends at `bound_px`, and red above it.
+fn color_of(px: f64, bound_px: f64) -> [u8; 3] {
+    let position = 1.0 + (px / bound_px).log10() / DECADES;
+    if px > bound_px { ABOVE_BOUND } else { ramp(if px > 0.0 { position.clamp(0.0, 1.0) } else { 0.0 }) }
+}
+
+fn tinted(image: &ColorImage, map: &ErrorMap, bound_px: f64) -> ColorImage {
     let [width, height] = image.size;
     let [columns, rows] = map.grid.map(|cells| cells.max(1) as usize);
-    let largest_px = map.known().map(|(_, px)| px).fold(0.0, f64::max);
     // The outer option: whether the cell has a probe. The inner: whether the probe has an error.
     let mut cells = vec![None::<Option<f64>>; columns * rows];
     for probe in &map.pixels {
@@ -65,9 +77,7 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
         )
     };
     let cells = cells.into_iter().enumerate().map(|(index, cell)| cell.unwrap_or_else(|| nearest_px(index)));
-    let colors: Vec<Option<[u8; 3]>> = cells
-        .map(|cell| cell.map(|px| ramp(if px > 0.0 { scale_position(px, largest_px) } else { 0.0 })))
-        .collect();
+    let colors: Vec<Option<[u8; 3]>> = cells.map(|cell| cell.map(|px| color_of(px, bound_px))).collect();
     let pixels = image.pixels.iter().enumerate().map(|(i, pixel)| {
         if pixel.a() == 0 {
             return Color32::TRANSPARENT;
@@ -102,7 +112,7 @@ mod tests {
             probe([1, 1], SourceError::NoSource),
         ];
         let map = ErrorMap { pixels, everywhere_px: 1.0, grid: [2, 2], reach_px: 2.0 };
-        let tinted = tinted(&image, &map);
+        let tinted = tinted(&image, &map, 0.1);
         let light = |i: usize| {
             u32::from(tinted.pixels[i].r())
                 + u32::from(tinted.pixels[i].g())
@@ -117,15 +127,13 @@ mod tests {
         );
         assert_eq!(tinted.pixels[7], Color32::TRANSPARENT);
         // A bright picture changes the brightness, not the hue.
-        let white = super::tinted(&ColorImage::new([4, 2], vec![Color32::WHITE; 8]), &map);
+        let white = super::tinted(&ColorImage::new([4, 2], vec![Color32::WHITE; 8]), &map, 0.1);
         let fraction = |pixel: Color32| f32::from(pixel.r()) / f32::from(pixel.g());
         assert!(
             (fraction(white.pixels[6]) - fraction(tinted.pixels[6])).abs() < 0.02
                 && white.pixels[6].g() > tinted.pixels[6].g()
         );
-        assert_eq!(
-            [scale_position(0.1, 0.1), scale_position(0.01, 0.1), scale_position(1e-6, 0.1)],
-            [1.0, 0.5, 0.0]
-        );
+        let colors = [0.1, 0.01, 1e-6, 0.0, 0.2].map(|px| color_of(px, 0.1));
+        assert_eq!(colors, [ramp(1.0), ramp(0.5), ramp(0.0), ramp(0.0), ABOVE_BOUND]);
     }
 }

@@ -2,13 +2,15 @@
 
 use std::{sync::Arc, time::Duration};
 
-use camsim_core::{reference::ReferenceRenderer, scenario::Scenario, sequence::Sequence};
+use camsim_core::{scenario::Scenario, sequence::Sequence};
+use camsim_engine::CameraReference;
 use camsim_io::load::Loaded;
 use eframe::egui::ColorImage;
 
 use super::{
     error_overlay::ErrorOverlay,
     picture::{Difference, Picture},
+    raw::Histogram,
 };
 
 /// Stage of the pipeline up to which a picture shows the camera's imperfections.
@@ -81,10 +83,22 @@ pub struct FrameRequest {
     pub size: Size,
     /// Whether depth is needed.
     pub depth: bool,
+    /// Whether the raw picture of the sensor is needed as an image.
+    pub raw: bool,
+    /// Whether a histogram is needed.
+    pub histogram: bool,
     /// Whether predicted errors over the image are needed; never with previews, which they would delay.
     pub errors: bool,
     /// Gain of the difference of the two stages; `None` if no difference is needed.
     pub gain: Option<f32>,
+}
+
+impl FrameRequest {
+    /// Whether both are of the same frame of the same scenario, be it in another size or with other images.
+    pub fn is_same_frame(&self, other: &Self) -> bool {
+        (self.frame, self.reload_count) == (other.frame, other.reload_count)
+            && self.scenario == other.scenario
+    }
 }
 
 /// What the window needs of the reference.
@@ -112,7 +126,7 @@ pub enum Reply {
     /// Predicted errors of pictures that were sent before.
     Errors(Box<ErrorsReply>),
     /// Exact rays in a sequence are ready.
-    Reference(Arc<ReferenceRenderer>),
+    Reference(Arc<CameraReference>),
     /// The reference's picture; rows may still be missing.
     ReferencePicture(Box<ReferencePicture>),
     /// A fault: what went wrong, and what to do.
@@ -143,6 +157,10 @@ pub struct FrameReply {
     pub pictures: Vec<Arc<Picture>>,
     /// Depth of each picture, if requested.
     pub depths: Vec<Arc<DepthPicture>>,
+    /// The raw picture of each picture, if requested; `None` for a stage without sensor.
+    pub raws: Vec<Option<Arc<ColorImage>>>,
+    /// Histogram of each picture, if requested: of the raw picture where that is requested too.
+    pub histograms: Vec<Histogram>,
     /// Predicted errors of each picture, if requested and cached; otherwise [`Reply::Errors`] follows.
     pub errors: Vec<Arc<ErrorOverlay>>,
     /// The difference of the two pictures, if requested.

@@ -8,7 +8,7 @@ use camsim_io::write::srgb8;
 use camsim_plan::FramePlan;
 use eframe::egui::{Color32, ColorImage};
 
-use super::messages::Stage;
+use super::{messages::Stage, raw::RawScale};
 
 /// A rendered frame with its plan and times.
 #[derive(Debug)]
@@ -17,12 +17,35 @@ pub struct Picture {
     pub stage: Stage,
     /// Linear values and row poses.
     pub frame: RenderedFrame,
-    /// The plan that it was rendered by.
+    /// The plan that it was rendered by; of a wide field that of its first face.
     pub plan: FramePlan,
+    /// The plans of the other faces.
+    pub faces: Vec<FramePlan>,
     /// Times of its passes.
     pub times: FrameTimes,
+    /// Time of all that was done for it, ms.
+    pub took_ms: f64,
+    /// How the raw picture of the frame is to be read; `None` without sensor.
+    pub raw_scale: Option<RawScale>,
     /// sRGB picture for the screen.
     pub image: Arc<ColorImage>,
+}
+
+impl Picture {
+    /// The plans of all faces; one without.
+    pub fn plans(&self) -> impl Iterator<Item = &FramePlan> {
+        std::iter::once(&self.plan).chain(&self.faces)
+    }
+
+    /// The plan of the face that shows a pixel; that of the first face where none does.
+    pub fn plan_at(&self, pixel: [u32; 2]) -> &FramePlan {
+        self.plans().find(|plan| plan.camera.unproject_pixel(pixel).is_some()).unwrap_or(&self.plan)
+    }
+
+    /// Bound on the source error of 99 % of the pixels.
+    pub fn predicted_px(&self) -> f64 {
+        self.plans().map(|plan| plan.predicted.total_px).fold(0.0, f64::max)
+    }
 }
 
 /// The difference of two pictures.

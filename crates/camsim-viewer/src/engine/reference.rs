@@ -6,11 +6,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use camsim_core::{
-    frame::RenderedFrame,
-    reference::{ReferenceRenderer, RenderOptions},
-    scenario::Channel,
-};
+use camsim_core::{frame::RenderedFrame, reference::RenderOptions, scenario::Channel};
+use camsim_engine::CameraReference;
 
 use super::{
     ReplySender,
@@ -21,6 +18,8 @@ use super::{
 
 /// Rows rendered between two checks for a newer request.
 const STRIP_ROWS: usize = 4;
+/// Rows below a row that its colours depend on in a mosaic.
+const MOSAIC_REACH: usize = 4;
 /// Least time between two replies, each of which carries the whole picture.
 const REPLY_INTERVAL: Duration = Duration::from_millis(250);
 /// A pixel's standard error as a fraction of `quality.max_error_dn`, as for `camsim render --backend
@@ -30,7 +29,8 @@ const SHARE_OF_TOLERANCE: f64 = 0.25;
 /// A frame with the rows rendered so far.
 struct PartialFrame {
     frame: u64,
-    color_rgba: Vec<f32>,
+    /// Linear R G B A before the stages that take whole frames.
+    light_rgba: Vec<f32>,
     rows: usize,
 }
 
@@ -46,13 +46,13 @@ pub fn run(mailbox: &Mailbox<ReferenceRequest>, replies: &ReplySender) {
             )));
         }
     };
-    let mut cached: Option<Arc<ReferenceRenderer>> = None;
+    let mut cached: Option<Arc<CameraReference>> = None;
     let mut partial: Option<PartialFrame> = None;
     while let Some(request) = mailbox.take() {
         let reference =
             match cached.take().filter(|reference| Arc::ptr_eq(reference.sequence(), &request.sequence)) {
                 Some(reference) => reference,
-                None => match ReferenceRenderer::new(request.sequence.clone()) {
+                None => match CameraReference::new(request.sequence.clone(), &[Channel::Color]) {
                     Ok(reference) => {
                         partial = None;
                         Arc::new(reference)
@@ -67,7 +67,7 @@ pub fn run(mailbox: &Mailbox<ReferenceRequest>, replies: &ReplySender) {
         replies.send(Reply::Reference(reference.clone()));
         let Some(frame) = request.frame else { continue };
         let [width, height] = request.sequence.scenario.camera.size_px.map(|side| side as usize);
-        let empty = || PartialFrame { frame, color_rgba: vec![0.0; 4 * width * height], rows: 0 };
+        let empty = || PartialFrame { frame, light_rgba: vec![0.0; 4 * width * height], rows: 0 };
         let partial = partial.get_or_insert_with(empty);
         if partial.frame != frame {
             *partial = empty();
@@ -77,20 +77,30 @@ pub fn run(mailbox: &Mailbox<ReferenceRequest>, replies: &ReplySender) {
 }
 
 /// The picture of the rows so far. Where light spreads, rows show what comes in, until all are there.
-fn shown(reference: &ReferenceRenderer, partial: &PartialFrame, size_px: [u32; 2]) -> Vec<f32> {
-    let color_rgba = partial.color_rgba.clone();
-    if !reference.spreads_light() || partial.rows < size_px[1] as usize {
-        return color_rgba;
+fn shown(reference: &CameraReference, partial: &PartialFrame, size_px: [u32; 2]) -> Vec<f32> {
+    let light_rgba = partial.light_rgba.clone();
+    if reference.spreads_light() && partial.rows < size_px[1] as usize {
+        return light_rgba;
     }
-    let picture = RenderedFrame::picture(size_px, color_rgba);
+    let picture = RenderedFrame::picture(size_px, light_rgba);
     let mut whole = RenderedFrame { index: partial.frame, ..picture };
     reference.expose(&mut whole);
     whole.into_color()
 }
 
+/// Number of rows, from the top, that later ones do not change. Colours of a mosaic need rows below.
+fn comparable_rows(reference: &CameraReference, rows: usize, height: usize) -> usize {
+    let has_mosaic = reference.sequence().scenario.camera.sensor.is_some();
+    match (rows == height, reference.spreads_light()) {
+        (true, _) => rows,
+        (false, true) => 0,
+        (false, false) => rows.saturating_sub(if has_mosaic { MOSAIC_REACH } else { 0 }),
+    }
+}
+
 /// Renders the missing rows from the top, until a newer request arrives.
 fn render_rows(
-    reference: &ReferenceRenderer,
+    reference: &CameraReference,
     request: &ReferenceRequest,
     partial: &mut PartialFrame,
     mailbox: &Mailbox<ReferenceRequest>,
@@ -101,11 +111,11 @@ fn render_rows(
     let [width, height] = size_px.map(|side| side as usize);
     let send = |partial: &PartialFrame| {
         let color_rgba = shown(reference, partial, size_px);
-        let is_comparable = partial.rows == height || !reference.spreads_light();
-        let difference = request.against.as_ref().filter(|_| is_comparable).and_then(|(picture, gain)| {
+        let rows = comparable_rows(reference, partial.rows, height);
+        let difference = request.against.as_ref().filter(|_| rows > 0).and_then(|(picture, gain)| {
             let against = &picture.frame;
             (against.size_px == size_px)
-                .then(|| difference(size_px, against.color_rgba(), &color_rgba, *gain, partial.rows as u32))
+                .then(|| difference(size_px, against.color_rgba(), &color_rgba, *gain, rows as u32))
                 .flatten()
         });
         replies.send(Reply::ReferencePicture(Box::new(ReferencePicture {
@@ -126,18 +136,13 @@ fn render_rows(
         let bottom = (partial.rows + STRIP_ROWS).min(height);
         let rows = partial.rows..bottom;
         let options = RenderOptions {
-            channels: vec![Channel::Color],
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,
-            only: Some((0..width * height).map(|pixel| rows.contains(&(pixel / width))).collect()),
             ..RenderOptions::default()
         };
-        let strip = reference.render(partial.frame, &options);
-        let range = 4 * width * rows.start..4 * width * rows.end;
-        if let (Some(to), Some(from)) =
-            (partial.color_rgba.get_mut(range.clone()), strip.color_rgba().get(range))
-        {
-            to.copy_from_slice(from);
-        }
+        let only: Vec<bool> = (0..width * height).map(|pixel| rows.contains(&(pixel / width))).collect();
+        let light = reference.light(partial.frame, &only, &options);
+        let strip = 4 * width * rows.start..4 * width * rows.end;
+        partial.light_rgba[strip.clone()].copy_from_slice(&light[strip]);
         partial.rows = bottom;
         if bottom == height || last_reply.elapsed() > REPLY_INTERVAL {
             send(partial);

@@ -149,6 +149,8 @@ mod tests {
             stages: vec![Stage::Ideal],
             size: Size::Preview,
             depth: false,
+            raw: false,
+            histogram: false,
             errors: false,
             gain: None,
         }

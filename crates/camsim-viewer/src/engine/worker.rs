@@ -17,6 +17,7 @@ use super::{
     mailbox::Mailbox,
     messages::{DepthPicture, ErrorsReply, FrameReply, FrameRequest, Reply, Size, Stage},
     picture::{Picture, depth_image, depth_range_m, difference, srgb_image},
+    raw::{RawScale, histogram, raw_image},
     scenario_cache::{ScenarioCache, ScenarioCacheError},
     variants::{preview_scenario, stage_scenario},
 };
@@ -153,6 +154,10 @@ impl<'a> Worker<'a> {
                 depths.push(Arc::new(self.depth_picture(sequence, stage, request.size, frame)?));
             }
         }
+        let raw = |picture: &Arc<Picture>| raw_image(picture).map(Arc::new);
+        let raws = pictures.iter().filter(|_| request.raw).map(raw).collect();
+        let histograms = pictures.iter().filter(|_| request.histogram);
+        let histograms = histograms.map(|picture| histogram(picture, request.raw)).collect();
         let errors = if request.errors { self.cached_errors(&pictures) } else { Vec::new() };
         let errors_missing = request.errors && errors.is_empty();
         let difference = match (request.gain, pictures.as_slice()) {
@@ -169,6 +174,8 @@ impl<'a> Worker<'a> {
             frame,
             pictures: pictures.clone(),
             depths,
+            raws,
+            histograms,
             errors,
             difference,
             took,
@@ -214,10 +221,14 @@ impl<'a> Worker<'a> {
         if let Some(cached) = self.cache.iter().find(|cached| is_same(cached)) {
             return Ok(cached.picture.clone());
         }
-        let finished = self.render(&variant(sequence, stage, size)?, &[Channel::Color], frame)?;
-        let Finished { frame, plan, times, .. } = finished;
+        let began = Instant::now();
+        let rendered = variant(sequence, stage, size)?;
+        let finished = self.render(&rendered, &[Channel::Color], frame)?;
+        let raw_scale = RawScale::new(&rendered.scenario.camera);
+        let Finished { frame, plan, faces, times, .. } = finished;
         let image = Arc::new(srgb_image(frame.size_px, frame.color_rgba()));
-        let picture = Arc::new(Picture { stage, frame, plan, times, image });
+        let took_ms = 1e3 * began.elapsed().as_secs_f64();
+        let picture = Arc::new(Picture { stage, frame, plan, faces, times, took_ms, raw_scale, image });
         if self.cache.len() >= CACHE_SIZE {
             self.cache.remove(0);
         }
@@ -269,8 +280,9 @@ impl<'a> Worker<'a> {
             return Ok(errors);
         }
         let planned = variant(sequence, picture.stage, size)?;
-        let map = self.session(&planned, &[Channel::Color])?.planner().error_map(&picture.plan)?;
-        let errors = Arc::new(ErrorOverlay::new(picture, map));
+        let planner = self.session(&planned, &[Channel::Color])?.planner();
+        let maps = picture.plans().map(|plan| planner.error_map(plan));
+        let errors = Arc::new(ErrorOverlay::new(picture, maps.collect::<Result<_, _>>()?));
         if let Some(cached) = self.cache.iter_mut().find(|cached| Arc::ptr_eq(&cached.picture, picture)) {
             cached.errors = Some(errors.clone());
         }

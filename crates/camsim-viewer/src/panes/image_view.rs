@@ -53,6 +53,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         .collect();
     toolbar::store_zoom(ui, viewports.first());
     draw(ui, state, &viewports);
+    pending(ui, state, pane);
     for viewport in &viewports {
         pinned_ring(ui, state, viewport);
     }
@@ -99,8 +100,9 @@ fn draw_stage(ui: &Ui, state: &State, viewport: &ImageViewport, stage: Stage, cl
         painter.rect_filled(viewport.picture_rect(picture.size_px), 0.0, Color32::from_rgb(255, 0, 0));
     }
     let depth = picture.depth.filter(|_| state.view.overlays.depth).map(|(_, image)| image);
+    let raw = picture.raw.filter(|_| state.view.overlays.raw);
     let errors = picture.errors.filter(|_| state.view.overlays.error).map(|(_, image)| image);
-    viewport.image(&painter, slot, depth.or(errors).unwrap_or(picture.image), picture.size_px);
+    viewport.image(&painter, slot, depth.or(raw).or(errors).unwrap_or(picture.image), picture.size_px);
     overlays::draw(
         &painter.with_clip_rect(painter.clip_rect().intersect(viewport.rect())),
         viewport,
@@ -108,16 +110,47 @@ fn draw_stage(ui: &Ui, state: &State, viewport: &ImageViewport, stage: Stage, cl
         &picture,
     );
     let corner = clip.intersect(viewport.pane).left_top() + egui::vec2(6.0, 4.0);
-    label(
-        &painter,
-        corner,
-        &format!(
-            "{slot:?}: {}{}{}",
-            stage.label(),
-            if depth.is_some() { ", depth" } else { "" },
-            progress(state, &picture)
-        ),
-    );
+    let instead = match (depth, raw) {
+        (Some(_), _) => ", depth",
+        (None, Some(_)) => ", raw",
+        (None, None) => "",
+    };
+    let text = format!("{slot:?}: {}, {}{instead}{}", stage.label(), frame(state), progress(state, &picture));
+    label(&painter, corner, &text);
+}
+
+/// The frame of the shown picture, and the timeline's if it is another one.
+fn frame(state: &State) -> String {
+    let shown = state.engine.shown.as_ref().map_or(0, |shown| shown.reply.frame);
+    let wanted = state.timeline.frame;
+    if shown == wanted {
+        format!("frame {shown}")
+    } else {
+        format!("frame {shown} (of {wanted} there is none yet)")
+    }
+}
+
+/// Marks a picture that is not the wanted one.
+fn pending(ui: &mut Ui, state: &State, pane: Rect) {
+    let Some(pending_s) = state.pending_s() else { return };
+    let text = format!("rendering frame {}, {pending_s:.0} s{}", state.timeline.frame, usual_time(state));
+    let galley = ui.painter().layout_no_wrap(text.clone(), FontId::proportional(13.0), Color32::WHITE);
+    let height = ui.spacing().interact_size.y;
+    let size = egui::vec2(galley.size().x + height + 16.0, height + 6.0);
+    let rect = Rect::from_min_size(pos2(pane.right() - size.x - 6.0, pane.top() + 4.0), size);
+    ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(120, 70, 0));
+    let spinner = Rect::from_min_size(rect.left_top() + egui::vec2(4.0, 3.0), egui::Vec2::splat(height));
+    ui.put(spinner, waiting);
+    let at = pos2(spinner.right() + 4.0, rect.center().y - 0.5 * galley.size().y);
+    ui.painter().galley(at, galley, Color32::WHITE);
+    let response = ui.interact(rect, ui.scope_id().with("pending"), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &text));
+}
+
+/// The time that the last full frame took.
+fn usual_time(state: &State) -> String {
+    let full_s = state.engine.full_ms.map(|ms| 1e-3 * ms).filter(|full_s| *full_s >= 1.0);
+    full_s.map_or_else(String::new, |full_s| format!(" (the last one took {full_s:.0} s)"))
 }
 
 /// Size of a preview, rows of the reference, and whether predicted errors are pending.

@@ -1,7 +1,12 @@
 //! The pixel under the cursor, or the pinned one: values, row time, ray, surface, predicted errors.
 
 use camsim_core::{
-    camera::CameraModel, geodesy::LocalFrame, reference::RaySample, scenario::SceneSpec,
+    camera::CameraModel,
+    geodesy::LocalFrame,
+    pose::CameraPose,
+    reference::RaySample,
+    scenario::{CameraSpec, SceneSpec},
+    sequence::Sequence,
     temporal::samples_for,
 };
 use camsim_io::write::srgb8;
@@ -11,7 +16,7 @@ use glam::DVec2;
 
 use super::{
     tooltips::WithTooltip,
-    widgets::{fact, facts, fixed, signed},
+    widgets::{fact, fixed, signed},
 };
 use crate::{
     engine_state::StagePicture,
@@ -22,6 +27,8 @@ use crate::{
 
 /// Chords that measure the length of each stretch of an exposure path.
 const CHORDS: u32 = 4;
+/// Angle off axis up to which a ray is shown as a point of the ideal image plane, degrees.
+const LARGEST_FLAT_DEG: f64 = 89.0;
 
 /// Draws the page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -42,7 +49,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
             values(ui, state, &picture, pixel);
         }
     }
-    let plan = state.engine.picture().map(|picture| &picture.plan);
+    let plan = state.engine.picture().map(|picture| picture.plan_at(pixel));
     geometry(ui, state, pixel, plan);
 }
 
@@ -68,19 +75,32 @@ fn values(ui: &mut Ui, state: &State, picture: &StagePicture<'_>, [x, y]: [u32; 
         ui.label("not rendered yet: rows are rendered from the top");
         return;
     }
-    facts(ui, picture.stage.label(), |ui| {
-        fact(ui, "linear", format!("{r:.5} {g:.5} {b:.5}"), "scene-linear R G B, as in the EXR");
-        fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");
-        fact(ui, "alpha", format!("{a:.0}"), "1 where there is a ray and a source, else 0");
-        if let Some(depth_m) = picture.depth.and_then(|(depth, _)| depth.depth_m.get(index / 4)) {
-            fact(
-                ui,
-                "depth, rendered",
-                format!("{depth_m:.3} m"),
-                "value of the depth channel; 0 for the sky",
-            );
-        }
-    });
+    fact(ui, "linear", format!("{r:.5} {g:.5} {b:.5}"), "scene-linear R G B, as in the EXR");
+    fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");
+    fact(ui, "alpha", format!("{a:.0}"), "1 where there is a ray and a source, else 0");
+    raw_facts(ui, picture, [x / factor, y / factor]);
+    if let Some(depth_m) = picture.depth.and_then(|(depth, _)| depth.depth_m.get(index / 4)) {
+        fact(ui, "depth, rendered", format!("{depth_m:.3} m"), "value of the depth channel; 0 for the sky");
+    }
+}
+
+/// Numbers of the image sensor, and the electrons that they stand for.
+fn raw_facts(ui: &mut Ui, picture: &StagePicture<'_>, [x, y]: [u32; 2]) {
+    let Some((scale, raw)) = picture.raw_numbers() else { return };
+    let channels = raw.channels as usize;
+    let first = channels * (y as usize * picture.size_px[0] as usize + x as usize);
+    let Some(numbers) = raw.values.get(first..first + channels) else { return };
+    for (color, number) in scale.colors([x, y]).into_iter().zip(numbers) {
+        let color = ["red", "green", "blue", "white"].get(color).copied().unwrap_or_default();
+        let electrons = scale.electrons(*number);
+        let electrons = electrons.map_or_else(|| ", companded".to_owned(), |e| format!(", {e:.1} electrons"));
+        fact(
+            ui,
+            &format!("raw, {color}"),
+            format!("{number} DN{electrons}"),
+            "number of the raw picture; electrons are (number - black) times the gain",
+        );
+    }
 }
 
 /// Exact geometry of a pixel, from the reference.
@@ -93,33 +113,32 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
         return;
     };
     let frame = shown.reply.frame;
-    let view = reference.view(frame);
     let stamp_s = reference.stamp_s(frame);
-    let mid_s = view.mid_s(pixel);
-    let sample = view.sample(pixel, DVec2::ZERO, 0.0);
-    facts(ui, "geometry", |ui| {
-        fact(
-            ui,
-            "row time",
-            format!("{} ms", signed(1e3 * (mid_s - stamp_s), 4)),
-            "mid-exposure after the frame's stamp, Delta t = t_d + ((r + 0.5)/N - 0.5) t_r",
-        );
-        fact(ui, "flight time", format!("{} s", fixed(mid_s, 6)), "seconds from the log's first good row");
-        match &sample {
-            None => fact(ui, "invalid", no_ray(state, pixel), "alpha 0"),
-            Some(sample) => {
-                ray_facts(ui, sample);
-                hit_facts(ui, state, sample);
-                let path = motion::pixel_path(reference, frame, pixel);
-                motion_facts(ui, pixel, path.as_ref());
-            }
+    let mid_s = reference.mid_s(frame, pixel);
+    let sample = state.engine.sample(pixel);
+    fact(
+        ui,
+        "row time",
+        format!("{} ms", signed(1e3 * (mid_s - stamp_s), 4)),
+        "mid-exposure after the frame's stamp, Delta t = t_d + ((r + 0.5)/N - 0.5) t_r",
+    );
+    fact(ui, "flight time", format!("{} s", fixed(mid_s, 6)), "seconds from the log's first good row");
+    match &sample {
+        None => fact(ui, "invalid", no_ray(state, pixel), "alpha 0"),
+        Some(sample) => {
+            // Of the whole camera: a sample has that of its face.
+            let pose = reference.sequence().path.pose(sample.t_s);
+            ray_facts(ui, &pose, sample);
+            hit_facts(ui, state, &pose, sample);
+            let path = motion::pixel_path(reference, frame, pixel);
+            motion_facts(ui, pixel, path.as_ref());
         }
-        let full = shown.reply.request.size == crate::engine::Size::Full;
-        if let (Some(plan), Some(sample)) = (plan.filter(|_| full), &sample) {
-            source_facts(ui, plan, sample);
-            sample_facts(ui, plan, |phase| view.sample(pixel, DVec2::ZERO, phase));
-        }
-    });
+    }
+    let full = shown.reply.request.size == crate::engine::Size::Full;
+    if let (Some(plan), Some(sample)) = (plan.filter(|_| full), &sample) {
+        source_facts(ui, plan, sample);
+        sample_facts(ui, plan, |phase| reference.sample(frame, pixel, DVec2::ZERO, phase));
+    }
     if let Some(plan) = plan {
         predicted_errors(ui, plan, predicted_here(state, pixel));
     }
@@ -127,44 +146,68 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
 
 /// Why a pixel has no ray.
 fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {
-    let camera = state.document.as_ref().map(|document| CameraModel::from_spec(&document.scenario.camera));
-    match camera {
-        Some(Ok(camera)) if camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_some() => {
-            "the reference has no ray here".into()
+    let Some(spec) = state.document.as_ref().map(|document| &document.scenario.camera) else {
+        return String::new();
+    };
+    let has_ray = |spec| {
+        let camera = CameraModel::from_spec(spec);
+        camera.is_ok_and(|camera| camera.ray(DVec2::new(f64::from(x), f64::from(y))).is_some())
+    };
+    let without_circle = CameraSpec { image_circle: None, ..spec.clone() };
+    match (has_ray(spec), has_ray(&without_circle)) {
+        (true, _) => "the reference has no ray here".into(),
+        (false, true) => "the pixel lies outside the image circle".into(),
+        (false, false) => {
+            "the lens has no ideal ray here: the pixel lies beyond the fold of its distortion".into()
         }
-        _ => "the lens has no ideal ray here: the pixel lies beyond the fold of its distortion".into(),
     }
 }
 
-/// The ray of a pixel.
-fn ray_facts(ui: &mut Ui, sample: &RaySample) {
-    fact(
-        ui,
-        "ray u, v",
-        format!("{}, {}", fixed(sample.uv.x, 6), fixed(sample.uv.y, 6)),
-        "ideal normalised coordinates (x/z, y/z), the lens's inverse",
-    );
-    let off_axis = sample.uv.length().atan().to_degrees();
-    fact(ui, "off axis", format!("{off_axis:.3} deg"), "angle to the optical axis");
+/// The ray of a sample in the axes of the whole camera.
+fn ray_facts(ui: &mut Ui, pose: &CameraPose, sample: &RaySample) {
+    let ray_ned = sample.pose.ned_from_camera * sample.uv.extend(1.0);
+    let ray = (pose.ned_from_camera.conjugate() * ray_ned).normalize();
+    let off_axis = ray.truncate().length().atan2(ray.z);
+    if off_axis < LARGEST_FLAT_DEG.to_radians() {
+        fact(
+            ui,
+            "ray u, v",
+            format!("{}, {}", fixed(ray.x / ray.z, 6), fixed(ray.y / ray.z, 6)),
+            "ideal normalised coordinates (x/z, y/z), the lens's inverse",
+        );
+    } else {
+        fact(
+            ui,
+            "ray x, y, z",
+            format!("{}, {}, {}", fixed(ray.x, 6), fixed(ray.y, 6), fixed(ray.z, 6)),
+            "unit vector in the camera's axes: right, down, along the optical axis",
+        );
+    }
+    fact(ui, "off axis", format!("{:.3} deg", off_axis.to_degrees()), "angle to the optical axis");
 }
 
 /// The surface that a ray hits.
-fn hit_facts(ui: &mut Ui, state: &State, sample: &RaySample) {
+fn hit_facts(ui: &mut Ui, state: &State, pose: &CameraPose, sample: &RaySample) {
     let Some(hit) = &sample.hit else {
         return fact(ui, "sees", "sky", "no surface along the ray");
     };
-    let scene = state.engine.sequence().map(|sequence| &sequence.scenario.scene);
+    let sequence = state.engine.sequence();
     fact(
         ui,
         "sees",
-        scene.map_or_else(String::new, |scene| surface_name(scene, hit.surface)),
-        "the first surface along the ray",
+        sequence.map_or_else(String::new, |sequence| surface_name(sequence, hit.surface)),
+        "the first surface along the ray, by its object",
     );
+    if let Some(motion) = sequence.and_then(|sequence| sequence.scene.motion_of_surface(hit.surface)) {
+        let speed_m_s = motion.state(sample.t_s).velocity(hit.point_ned_m).length();
+        fact(ui, "moves at", format!("{speed_m_s:.3} m/s"), "speed of the point at the instant of the ray");
+    }
+    let in_camera = pose.ned_from_camera.conjugate() * (hit.point_ned_m - pose.position_ned_m);
     fact(
         ui,
         "depth",
-        format!("{:.3} m", hit.depth_m),
-        "planar, along the optical axis at the row's mid-exposure",
+        format!("{:.3} m", in_camera.z),
+        "planar, along the optical axis at the row's mid-exposure; negative behind the camera",
     );
     let point = hit.point_ned_m;
     let range_m = point.distance(sample.pose.position_ned_m);
@@ -180,8 +223,19 @@ fn hit_facts(ui: &mut Ui, state: &State, sample: &RaySample) {
     }
 }
 
-/// Name of a surface by its number: terrain, pattern, board, then models.
-fn surface_name(scene: &SceneSpec, number: u32) -> String {
+/// Name of a surface by its number: its object's, with the number that the channel `object` has; without object,
+/// terrain, pattern, board or model.
+fn surface_name(sequence: &Sequence, number: u32) -> String {
+    let scene = &sequence.scene;
+    let object = scene.object_of_surface(number);
+    let known = object.checked_sub(1).and_then(|index| scene.objects.get(index as usize));
+    match known.filter(|object| !object.name.is_empty()) {
+        Some(named) => format!("{} (object {object})", named.name),
+        None => kind_of_surface(&sequence.scenario.scene, number),
+    }
+}
+
+fn kind_of_surface(scene: &SceneSpec, number: u32) -> String {
     let flat = [("pattern", scene.pattern.is_some()), ("board", scene.board.is_some())];
     let named = std::iter::once("terrain")
         .chain(flat.into_iter().filter_map(|(name, is_there)| is_there.then_some(name)));
@@ -277,42 +331,40 @@ fn exceeded_mark(is_kept: bool) -> &'static str {
 fn predicted_errors(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
     ui.separator();
     ui.strong("as rendered");
-    facts(ui, "certainty", |ui| {
-        let predicted = &plan.predicted;
-        if let Some(here) = here {
-            fact(
-                ui,
-                "predicted here",
-                here,
-                "largest source error of the planner's dry runs near this pixel, with a safety factor; \
-                 about 99 % of pixels at mid-exposure are below it",
-            );
-        }
+    let predicted = &plan.predicted;
+    if let Some(here) = here {
         fact(
             ui,
-            "predicted error",
-            format!("{:.4} px{}", predicted.total_px, exceeded_mark(predicted.source_error_kept)),
-            "bound on the source error of 99 % of the frame's pixels",
+            "predicted here",
+            here,
+            "largest source error of the planner's dry runs near this pixel, with a safety factor; \
+             about 99 % of pixels at mid-exposure are below it",
         );
-        fact(
-            ui,
-            "of grey levels",
-            format!("{:.3} of 255{}", predicted.picture_dn(), exceeded_mark(predicted.picture_error_kept)),
-            "expected RMS picture error, from resampling, blur samples and silhouettes",
-        );
-        let samples = plan.blur.map_or_else(
-            || "1".to_owned(),
-            |blur| {
-                format!(
-                    "{} nodes, {:.2} a px of path, {} at most",
-                    blur.solved(),
-                    blur.samples_per_px,
-                    blur.max_samples
-                )
-            },
-        );
-        fact(ui, "samples", samples, "of the exposure");
-    });
+    }
+    fact(
+        ui,
+        "predicted error",
+        format!("{:.4} px{}", predicted.total_px, exceeded_mark(predicted.source_error_kept)),
+        "bound on the source error of 99 % of the frame's pixels",
+    );
+    fact(
+        ui,
+        "of grey levels",
+        format!("{:.3} of 255{}", predicted.picture_dn(), exceeded_mark(predicted.picture_error_kept)),
+        "expected RMS picture error, from resampling, blur samples and silhouettes",
+    );
+    let samples = plan.blur.map_or_else(
+        || "1".to_owned(),
+        |blur| {
+            format!(
+                "{} nodes, {:.2} a px of path, {} at most",
+                blur.solved(),
+                blur.samples_per_px,
+                blur.max_samples
+            )
+        },
+    );
+    fact(ui, "samples", samples, "of the exposure");
     if plan.predicted.void_fraction > 0.0 {
         ui.label(
             egui::RichText::new(format!(

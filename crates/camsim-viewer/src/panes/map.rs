@@ -111,8 +111,8 @@ fn draw_camera(
         painter.add(Shape::line(on_screen, Stroke::new(1.5, CAMERA_COLOR)));
     }
     for side in [DVec2::NEG_X, DVec2::X] {
-        if let Some(uv) = footprint::outermost(camera, side, Some) {
-            let ray = pose.ned_from_camera * uv.extend(1.0).normalize();
+        if let Some(ray) = footprint::outermost(camera, side, Some) {
+            let ray = pose.ned_from_camera * ray;
             painter.line_segment(
                 [here, screen(position_ne_m + ray_m * ray.truncate())],
                 Stroke::new(1.0, CAMERA_COLOR),

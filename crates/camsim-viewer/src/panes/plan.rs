@@ -1,9 +1,10 @@
 //! The plan of the shown frame: passes and times, predicted errors, passes that are skipped.
 
-use camsim_plan::Predicted;
+use camsim_core::scenario::Face;
+use camsim_plan::{FramePlan, Predicted};
 use eframe::egui::{self, RichText, Ui};
 
-use super::widgets::{fact, facts};
+use super::widgets::fact;
 use crate::{
     engine::{Picture, Size},
     state::State,
@@ -21,9 +22,18 @@ pub fn show(ui: &mut Ui, state: &State) {
     let has_terrain = state.engine.sequence().is_some_and(|sequence| sequence.scene.terrain.is_some());
     for picture in &shown.reply.pictures {
         ui.strong(format!("frame {}, {}", picture.plan.frame, picture.stage.label()));
-        passes(ui, picture);
-        errors(ui, picture, has_terrain);
-        skipped(ui, picture);
+        times(ui, picture);
+        for plan in picture.plans() {
+            // Unique on the page: grids and headers have names.
+            let face = plan.camera.lens.face();
+            let name = format!("{} {}", picture.stage.label(), face.map_or("", Face::name));
+            if let Some(face) = face {
+                ui.strong(format!("{} face", face.name()));
+            }
+            passes(ui, plan);
+            errors(ui, plan, &name, has_terrain);
+            skipped(ui, plan, &name);
+        }
         ui.separator();
     }
     if let Some(ms) = state.engine.full_ms {
@@ -35,41 +45,59 @@ pub fn show(ui: &mut Ui, state: &State) {
     }
 }
 
-/// Passes and their times.
-fn passes(ui: &mut Ui, picture: &Picture) {
-    for pass in picture.plan.passes() {
-        ui.label(format!("- {pass}"));
-    }
+/// What each stage of a picture took.
+fn times(ui: &mut Ui, picture: &Picture) {
     let times = &picture.times;
-    facts(ui, &format!("times {}", picture.stage.label()), |ui| {
+    let stages = [
+        ("planned", Some(times.plan_ms), "on the cpu: choice of methods, triangles, poses"),
+        ("recorded", Some(times.record_ms), "on the cpu: passes for the gpu"),
+        ("submitted", Some(times.submit_ms), "by the driver"),
+        ("ideal frame", times.ideal_ms, "drawn on the cpu"),
+        ("waited", Some(times.wait_ms), "for the gpu"),
+        ("output frame", times.reverse_ms, "rendered on the cpu"),
+        ("read", Some(times.read_ms), "from the gpu, with rays of truth"),
+    ];
+    let known = stages.iter().filter_map(|(name, ms, tip)| Some((*name, (*ms)?, *tip)));
+    let known: Vec<_> = known.filter(|(_, ms, _)| *ms > 0.0).collect();
+    let sum_ms: f64 = known.iter().map(|(_, ms, _)| ms).sum();
+    for (name, ms, tip) in known {
+        fact(ui, name, format!("{ms:.1} ms"), tip);
+    }
+    let rest_ms = picture.took_ms - sum_ms;
+    if rest_ms >= 0.0 {
         fact(
             ui,
-            "planned in",
-            format!("{:.1} ms", times.plan_ms),
-            "on the cpu: choice of methods, triangles, poses",
+            "the rest",
+            format!("{rest_ms:.1} ms"),
+            "scene for this stage, optics, sensor, picture for the screen",
         );
-        fact(ui, "recorded in", format!("{:.1} ms", times.record_ms), "on the cpu");
-        fact(ui, "submitted in", format!("{:.1} ms", times.submit_ms), "by the driver");
-        fact(ui, "waited", format!("{:.1} ms", times.wait_ms), "for the gpu");
-        fact(ui, "read in", format!("{:.1} ms", times.read_ms), "from the gpu");
-        for pass in &times.passes {
-            fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the gpu, by time stamps");
-        }
-    });
+    }
+    let tip = "from the request to the picture; faces overlap, so that their stages may sum to more";
+    fact(ui, "in all", format!("{:.1} ms", picture.took_ms), tip);
+    for pass in &times.passes {
+        fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the gpu, by time stamps, while waited for");
+    }
+}
+
+/// Passes of a plan.
+fn passes(ui: &mut Ui, plan: &FramePlan) {
+    for pass in plan.passes() {
+        ui.label(format!("- {pass}"));
+    }
 }
 
 /// Predicted errors, and whether they are within the scenario's tolerances.
-fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
-    let predicted = &picture.plan.predicted;
+fn errors(ui: &mut Ui, plan: &FramePlan, name: &str, has_terrain: bool) {
+    let predicted = &plan.predicted;
     if predicted.probes == 0 {
         verdict(ui, false, Some("no probe has a source in the ideal frame: the picture is empty"));
         return;
     }
-    facts(ui, &format!("errors {}", picture.stage.label()), |ui| source_error(ui, picture, has_terrain));
+    source_error(ui, plan, has_terrain);
     verdict(ui, predicted.source_error_kept, predicted.source_error_obstacle.as_deref());
-    facts(ui, &format!("levels {}", picture.stage.label()), |ui| picture_error(ui, predicted));
+    picture_error(ui, predicted);
     verdict(ui, predicted.picture_error_kept, predicted.picture_error_obstacle.as_deref());
-    if picture.plan.extrapolated {
+    if plan.extrapolated {
         ui.label(
             RichText::new("beyond the log: extrapolated at constant velocity")
                 .color(ui.visuals().warn_fg_color),
@@ -88,8 +116,7 @@ fn verdict(ui: &mut Ui, is_kept: bool, cause: Option<&str>) {
 }
 
 /// Source error by cause.
-fn source_error(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
-    let plan = &picture.plan;
+fn source_error(ui: &mut Ui, plan: &FramePlan, has_terrain: bool) {
     let predicted = &plan.predicted;
     fact(
         ui,
@@ -174,14 +201,14 @@ fn picture_error(ui: &mut Ui, predicted: &Predicted) {
 }
 
 /// Passes that are skipped, with reasons.
-fn skipped(ui: &mut Ui, picture: &Picture) {
-    egui::CollapsingHeader::new(format!("skipped ({})", picture.plan.skipped.len()))
-        .id_salt(("skipped", picture.stage.label()))
-        .default_open(true)
+fn skipped(ui: &mut Ui, plan: &FramePlan, name: &str) {
+    egui::CollapsingHeader::new(format!("skipped ({})", plan.skipped.len()))
+        .id_salt(("skipped", name))
+        .default_open(plan.camera.lens.face().is_none_or(|face| face == Face::Front))
         .show(ui, |ui| {
-            for skip in &picture.plan.skipped {
+            for skip in &plan.skipped {
                 ui.label(RichText::new(skip.what).strong());
-                ui.indent((skip.what, picture.stage.label()), |ui| ui.label(&skip.reason));
+                ui.indent((skip.what, name), |ui| ui.label(&skip.reason));
             }
         });
 }

@@ -22,7 +22,7 @@ use super::{
     map::static_map::{self, StaticMap},
     number_field::{self, NumberField},
     tooltips::WithTooltip,
-    widgets::{fact, facts, fixed, small_button},
+    widgets::{fact, fixed, small_button},
 };
 use crate::{
     message::{Message, Outbox},
@@ -241,30 +241,28 @@ fn legend(ui: &mut Ui, map: &StaticMap, frustum: Option<&ViewFrustum>, camera_ne
     });
     let size = map.bounds[1] - map.bounds[0];
     let decimals = if size.max_element() < 20.0 { 3 } else { 1 };
-    facts(ui, "3D", |ui| {
-        let [north, east, down] = camera_ned_m.to_array().map(|m| fixed(m, decimals));
+    let [north, east, down] = camera_ned_m.to_array().map(|m| fixed(m, decimals));
+    fact(
+        ui,
+        &format!("frame {frame}"),
+        format!("{north} N, {east} E, {down} D m"),
+        "position of the camera at the frame's stamp",
+    );
+    if let Some(frustum) = frustum {
+        let [across, down, corners] = frustum.fov_deg.map(|deg| fixed(deg, 2));
         fact(
             ui,
-            &format!("frame {frame}"),
-            format!("{north} N, {east} E, {down} D m"),
-            "position of the camera at the frame's stamp",
+            "field of view",
+            format!("{across} x {down} deg, {corners} between corners"),
+            "between opposite outer borders, or the outermost rays",
         );
-        if let Some(frustum) = frustum {
-            let [across, down, corners] = frustum.fov_deg.map(|deg| fixed(deg, 2));
-            fact(
-                ui,
-                "field of view",
-                format!("{across} x {down} deg, {corners} between corners"),
-                "angles between opposite outermost pixels that have rays",
-            );
-        }
-        fact(
-            ui,
-            "extent",
-            format!("{} x {} m", fixed(size.y, decimals), fixed(size.x, decimals)),
-            "of the ground shown; heights are to the same scale",
-        );
-    });
+    }
+    fact(
+        ui,
+        "extent",
+        format!("{} x {} m", fixed(size.y, decimals), fixed(size.x, decimals)),
+        "of the ground shown; heights are to the same scale",
+    );
 }
 
 /// Time of the track point nearest to a clicked position, seconds after frame 0.

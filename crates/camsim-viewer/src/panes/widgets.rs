@@ -8,6 +8,8 @@ use super::tooltips::WithTooltip;
 
 /// Time between two steps of [`waiting`].
 const STEP: Duration = Duration::from_millis(250);
+/// Width of the labels of [`fact`], points: that of "predicted error".
+const LABEL_WIDTH: f32 = 108.0;
 /// Steps of a turn.
 const STEPS: u64 = 8;
 
@@ -58,16 +60,26 @@ fn clicked(button: Response, name: &str, tooltip: &str) -> bool {
     button.clicked()
 }
 
-/// A row of a table: label and value, which can be selected and copied.
+/// A row of a table: label and value, which wraps, and can be selected and copied.
 pub fn fact(ui: &mut Ui, label: &str, value: impl Into<String>, tooltip: &str) {
-    ui.label(egui::RichText::new(label).weak()).with_tooltip(tooltip);
-    ui.label(value.into());
-    ui.end_row();
+    ui.horizontal_top(|ui| {
+        let column = vec2(LABEL_WIDTH, ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(column, egui::Layout::left_to_right(egui::Align::TOP), |ui| {
+            ui.set_min_width(LABEL_WIDTH);
+            ui.label(egui::RichText::new(label).weak()).with_tooltip(tooltip);
+        });
+        ui.add(egui::Label::new(value.into()).wrap());
+    });
 }
 
-/// Two columns for [`fact`].
-pub fn facts(ui: &mut Ui, name: &str, rows: impl FnOnce(&mut Ui)) {
-    egui::Grid::new(name).num_columns(2).spacing([10.0, 3.0]).show(ui, rows);
+/// Draws contents in the rest of a panel. What they need beyond its width is cut off: a long text must not widen
+/// the panel, which would stay wide.
+pub fn within_panel(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
+    let rest = ui.available_rect_before_wrap();
+    let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(rest));
+    inner.set_clip_rect(rest.intersect(ui.clip_rect()));
+    contents(&mut inner);
+    ui.advance_cursor_after_rect(rest);
 }
 
 /// A number with `decimals` decimals, without "-0".

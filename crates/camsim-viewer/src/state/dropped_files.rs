@@ -54,7 +54,9 @@ pub fn apply_dropped(state: &mut State, path: &Path) {
         "toml" => state.open(path.into()),
         "yaml" | "yml" if is_target(path) => add_target(state, path),
         "yaml" | "yml" | "xml" | "json" => import_calibration(state, path),
-        "csv" | "txt" | "tum" | "log" => set_path(state, "flight.log", path),
+        "csv" | "txt" | "tum" | "log" | "ulg" | "bin" | "mcap" | "igc" | "gpx" | "kml" | "pos" => {
+            set_path(state, "flight.log", path)
+        }
         "png" | "jpg" | "jpeg" | "bmp" | "gif" | "pgm" | "ppm" => {
             if state.document.is_none() {
                 state.notice(no_scenario(path));
@@ -70,11 +72,11 @@ pub fn apply_dropped(state: &mut State, path: &Path) {
             }
         }
         "glb" | "gltf" => add_model(state, path),
-        "tif" | "tiff" => set_path(state, "scene.terrain.dem", path),
+        "tif" | "tiff" | "asc" | "hgt" => set_path(state, "scene.terrain.dem", path),
         _ => state.notice(format!(
             "{}: unknown kind of file; expected a scenario or camera (.toml), a calibration or Kalibr \
-             target (.yaml, .xml, .json), a log (.csv, .txt, .tum), a picture (.png, .jpg, .bmp, ...), a \
-             terrain (.tif) or a model (.glb, .gltf)",
+             target (.yaml, .xml, .json), a log (.csv, .txt, .ulg, .bin, .mcap, .igc, .gpx, .kml), a picture \
+             (.png, .jpg, .bmp, ...), heights (.tif, .asc, .hgt) or a model (.glb, .gltf)",
             path.display()
         )),
     }
@@ -104,7 +106,7 @@ fn is_target(path: &Path) -> bool {
 
 /// The surface point that the pinned pixel sees, NED.
 fn pinned_point_ned_m(state: &State) -> Option<[f64; 3]> {
-    state.pinned.and_then(|pixel| state.engine.point_ned_m(pixel)).map(|point| point.to_array())
+    state.pinned.and_then(|pixel| state.engine.sample(pixel)?.hit).map(|hit| hit.point_ned_m.to_array())
 }
 
 fn floats(values: [f64; 3]) -> Value {

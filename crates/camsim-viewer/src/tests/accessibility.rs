@@ -59,8 +59,15 @@ fn every_control_of_every_pane_has_an_accessible_name() {
     for compare in Compare::ALL {
         let view = &mut window.state_mut().view;
         (view.compare, view.a, view.b) = (compare, Stage::Photometric, Stage::Lens);
-        view.overlays =
-            Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
+        view.overlays = Overlays {
+            invalid: true,
+            grid: true,
+            motion: true,
+            rows: true,
+            error: true,
+            histogram: true,
+            ..Overlays::default()
+        };
         window.step();
         window.harness.check_accessibility();
     }

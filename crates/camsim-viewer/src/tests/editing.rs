@@ -196,3 +196,30 @@ fn warnings_of_render_are_shown() {
     window.settle();
     assert_eq!(shown(&window), 0);
 }
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn keys_are_sought_by_name_and_description() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let shows = |window: &Window, key: &str| window.harness.query_all_by_label(key).next().is_some();
+    assert!(!shows(&window, "tracker.bandwidth_hz"));
+    window.harness.get_by_label("search keys").set_text_value_accesskit("camera.MOUNT");
+    (0..3).for_each(|_| window.step());
+    // Sections that have a match are open, others are not there.
+    assert!(shows(&window, "camera.mount") && !shows(&window, "camera.shutter"));
+    assert!(!shows(&window, "camera.shutter.readout_ms"));
+    window.harness.get_by_label("search keys").set_text_value_accesskit("no such key");
+    (0..3).for_each(|_| window.step());
+    assert!(shows(&window, "no key has \"no such key\" in its name or description"));
+    window.click("clear the search");
+    assert!(shows(&window, "camera.shutter.readout_ms"));
+}
+
+#[test]
+fn lists_of_sensors_have_their_own_sections() {
+    let names = crate::panes::parameters::section_names();
+    for sensor in ["imu", "gnss", "barometer", "magnetometer"] {
+        assert!(names.contains(&sensor), "{sensor} in {names:?}");
+    }
+}

@@ -6,7 +6,8 @@ use egui_kittest::kittest::Queryable;
 use super::harness::{Window, pattern};
 use crate::view::{Compare, Tab};
 
-const OVERLAYS: [&str; 6] = ["invalid", "grid", "motion", "row times", "predicted error", "depth"];
+const OVERLAYS: [&str; 7] =
+    ["invalid", "grid", "motion", "row times", "predicted error", "depth", "histogram"];
 
 fn rect(window: &Window, label: &str) -> Rect {
     window.harness.get_by_label(label).rect()
@@ -90,4 +91,26 @@ fn tooltips_cover_neither_their_control_nor_its_neighbours() {
     let control = center(&window, "Render");
     let shown = tooltip_rect(&mut window, control, "render to this folder");
     assert!(shown.right() < rect(&window, "folder").left(), "{shown} on the left of the page");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn long_texts_do_not_widen_the_panels() {
+    let mut window = Window::with(Some(pattern()), None, [1280.0, 800.0]);
+    window.settle();
+    let before = rect(&window, "picture");
+    for tab in Tab::ALL {
+        window.state_mut().view.tab = tab;
+        window.state_mut().pinned = Some([320, 240]);
+        // Without a place to break.
+        window.state_mut().engine.adapter = "a".repeat(400);
+        window.state_mut().notices = Vec::new();
+        (0..3).for_each(|_| window.step());
+        assert_eq!(rect(&window, "picture").x_range(), before.x_range(), "{tab:?}");
+    }
+    let text = "camera.shutter.readout_ms ".repeat(20);
+    window.state_mut().rejected_input =
+        Some(crate::message::RejectedInput { name: "camera.shutter.readout_ms".into(), text });
+    (0..3).for_each(|_| window.step());
+    assert_eq!(rect(&window, "picture").x_range(), before.x_range(), "a rejected input");
 }

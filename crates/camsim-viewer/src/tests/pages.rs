@@ -1,7 +1,7 @@
 //! Pages of the right panel, shortcuts, window sizes.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, mpsc::channel},
 };
 
@@ -33,7 +33,7 @@ fn the_inspector_shows_the_geometry_of_the_pixel() {
     let shutter = Shutter::from_spec(&scenario.camera.shutter, scenario.camera.fps, scenario.camera.size_px)
         .expect("a shutter");
     assert!(has(&window, &format!("{:+.4} ms", 1e3 * shutter.dt_row_s(400))), "the row's time");
-    assert!(has(&window, "terrain"));
+    assert!(has(&window, "terrain (object 1)"));
     let [r, g, b, a] =
         window.state().engine.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
     assert_eq!(a, 255);
@@ -292,4 +292,50 @@ fn files_dragged_over_the_window_are_named() {
     window.harness.input_mut().hovered_files.clear();
     window.step();
     assert!(!has(&window, "drop to open or use pattern.toml"));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn what_moves_is_named() {
+    let propeller = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/propeller/propeller.toml");
+    let mut window = Window::open(Some(propeller));
+    window.settle_reference();
+    let engine = &window.state().engine;
+    let scene = &engine.sequence().expect("loaded").scene;
+    let moves = |pixel: &[u32; 2]| {
+        let hit = engine.sample(*pixel).and_then(|sample| sample.hit);
+        hit.is_some_and(|hit| scene.motion_of_surface(hit.surface).is_some())
+    };
+    let pixels = (0..480).step_by(8).flat_map(|y| (0..640).step_by(8).map(move |x| [x, y]));
+    let pixel = pixels.into_iter().find(|pixel| moves(pixel)).expect("a blade");
+    let name = scene.moving_objects()[0].to_owned();
+    send(&mut window, Message::Pin(Some(pixel)));
+    (0..2).for_each(|_| window.step());
+    assert!(has(&window, "moves at"));
+    assert!(
+        window.harness.query_all_by_label_contains(&format!("{name} (object")).next().is_some(),
+        "{name}"
+    );
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn times_of_the_plan_add_up() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let picture = window.state().engine.picture().expect("a picture");
+    let times = &picture.times;
+    let stages = [
+        Some(times.plan_ms),
+        Some(times.record_ms),
+        Some(times.submit_ms),
+        times.ideal_ms,
+        Some(times.wait_ms),
+        times.reverse_ms,
+        Some(times.read_ms),
+    ];
+    let sum_ms: f64 = stages.into_iter().flatten().sum();
+    assert!(sum_ms > 0.0 && sum_ms <= picture.took_ms, "{sum_ms} of {}", picture.took_ms);
+    window.click("Plan");
+    assert!(has(&window, "the rest") && has(&window, "in all"));
 }

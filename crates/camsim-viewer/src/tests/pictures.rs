@@ -148,7 +148,7 @@ fn overlays_are_drawn_and_depth_replaces_colour() {
     window.settle_reference();
     let plain = window.picture();
     let overlays =
-        Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
+        Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, ..Overlays::default() };
     for (name, only) in [
         ("grid", Overlays { grid: true, ..Overlays::default() }),
         ("motion", Overlays { motion: true, ..Overlays::default() }),

@@ -175,3 +175,44 @@ fn every_key_press_counts_within_one_pass() {
     assert!(window.state().path_prompt.is_some());
     assert_eq!(window.state().timeline.frame, 23);
 }
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_late_full_frame_does_not_replace_the_preview_of_the_wanted_one() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let late = window.state().engine.shown.as_ref().expect("shown").reply.clone();
+    window.state_mut().timeline.dragged = true;
+    send(&mut window, Message::Seek(50));
+    window.wait("the preview", |state| shown_request(state).is_some_and(|request| request.frame == 50));
+    window.state_mut().timeline.dragged = false;
+    // The renderer was still busy with the frame before.
+    let context = window.harness.ctx.clone();
+    window.state_mut().receive(crate::engine::Reply::Frame(Box::new(late.clone())), &context);
+    assert_eq!(window.state().engine.shown.as_ref().map(|shown| shown.reply.frame), Some(50));
+    window.settle();
+    assert!(!window.state().is_pending());
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_picture_that_is_not_the_wanted_one_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Large, so that a full frame takes longer than the mark waits.
+    let camera = "size_px = [2400, 1800]\nfocal_px = [1600.0, 1600.0]\n\
+        mount = { angles_deg = [0.0, -90.0, 0.0] }\nshutter = { exposure_ms = 8.0 }\n";
+    let mut window = Window::open(Some(super::wide::with_camera(folder.path(), camera)));
+    window.settle();
+    send(&mut window, Message::Seek(30));
+    let mark = "rendering frame 30";
+    let is_marked = |window: &Window| window.harness.query_all_by_label_contains(mark).next().is_some();
+    let mut marked = false;
+    while !marked && window.state().is_pending() {
+        window.step();
+        marked = is_marked(&window);
+    }
+    assert!(marked, "a mark while the frame is missing");
+    window.settle();
+    window.step();
+    assert!(!is_marked(&window), "no mark once it is there");
+}

@@ -24,6 +24,8 @@ fn request(frame: u64) -> FrameRequest {
         stages: vec![Stage::Photometric],
         size: Size::Preview,
         depth: false,
+        raw: false,
+        histogram: false,
         errors: false,
         gain: None,
     }

@@ -1,13 +1,13 @@
 //! Overlays of a picture: distortion grid, motion, row times, colour scales.
 
-use camsim_core::camera::CameraModel;
+use camsim_core::{camera::CameraModel, scenario::Face};
 use camsim_plan::ErrorMap;
 use eframe::egui::{self, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::viewport::ImageViewport;
 use crate::{
-    engine::{DECADES, Stage},
+    engine::{ABOVE_BOUND, BARS, DECADES, Histogram, Stage},
     engine_state::StagePicture,
     motion,
     panes::ramp_color,
@@ -16,12 +16,23 @@ use crate::{
 
 /// Magnification of image motion, most of which is about a pixel.
 const MOTION_SCALE: f64 = 8.0;
+/// Height of a histogram, points.
+const HISTOGRAM_HEIGHT: f32 = 80.0;
+/// Red, green, blue and white pixels of a histogram.
+const HISTOGRAM_COLORS: [Color32; 4] = [
+    Color32::from_rgb(255, 110, 110),
+    Color32::from_rgb(110, 230, 110),
+    Color32::from_rgb(120, 160, 255),
+    Color32::from_rgb(230, 230, 230),
+];
 /// Width and height of a colour scale, points.
 const SCALE_SIZE: [f32; 2] = [120.0, 8.0];
 /// Steps of a colour scale.
 const SCALE_STEPS: u8 = 24;
 /// Lines of the distortion grid over the picture's width.
 const GRID_LINES: i32 = 16;
+/// Lines of it from the middle of a cube's face to its border.
+const FACE_LINES: i32 = 6;
 /// Points of each line of the grid.
 const GRID_POINTS: i32 = 96;
 
@@ -32,7 +43,14 @@ pub fn draw(painter: &Painter, viewport: &ImageViewport, state: &State, picture:
     if overlays.grid
         && let Ok(camera) = stage_camera(state, picture.stage)
     {
-        grid(painter, viewport, &camera);
+        let is_wide =
+            picture.rendered.or(state.engine.picture()).is_some_and(|picture| !picture.faces.is_empty());
+        grid(
+            painter,
+            viewport,
+            &camera,
+            if is_wide && picture.stage >= Stage::Lens { &Face::ALL } else { &[] },
+        );
     }
     if overlays.motion && picture.stage >= Stage::Time {
         motion_paths(painter, viewport, state);
@@ -45,9 +63,13 @@ pub fn draw(painter: &Painter, viewport: &ImageViewport, state: &State, picture:
     {
         depth_scale(painter, depth.range_m);
     } else if overlays.error
-        && let (Some(plan), Some((errors, _))) = (picture.plan, picture.errors)
+        && !(overlays.raw && picture.raw.is_some())
+        && let (Some(rendered), Some((errors, _))) = (picture.rendered, picture.errors)
     {
-        error_scale(painter, &errors.map, plan.predicted.total_px);
+        error_scale(painter, &errors.map, rendered.predicted_px());
+    }
+    if let Some(histogram) = picture.histogram.filter(|_| overlays.histogram) {
+        draw_histogram(painter, histogram);
     }
 }
 
@@ -61,31 +83,42 @@ fn stage_camera(state: &State, stage: Stage) -> Result<CameraModel, camsim_core:
     zoom.map_or_else(|| CameraModel::from_spec(&camera), |zoom| CameraModel::at_zoom(&camera, zoom))
 }
 
-/// Lines of equal u and of equal v within the lens's domain.
-fn grid(painter: &Painter, viewport: &ImageViewport, camera: &CameraModel) {
+/// Lines of equal u and of equal v within the lens's domain; of a wide field, on each of the faces of a cube.
+fn grid(painter: &Painter, viewport: &ImageViewport, camera: &CameraModel, faces: &[Face]) {
     let [width, height] = camera.size_px.map(f64::from);
-    let step = width / camera.focal_px.x / f64::from(GRID_LINES);
-    // Barrel distortion shows rays far beyond a pinhole's frame.
-    let reach = GRID_LINES;
-    let ratio = f64::from(2 * reach) / f64::from(GRID_POINTS);
     let stroke = Stroke::new(1.0, Color32::from_rgba_unmultiplied(255, 220, 60, 150));
-    for line in -reach..=reach {
-        for upright in [true, false] {
-            let fixed = f64::from(line) * step;
-            let mut run: Vec<Pos2> = Vec::new();
-            for point in 0..=GRID_POINTS {
-                let along = (f64::from(point) * ratio - f64::from(reach)) * step;
-                let uv = if upright { DVec2::new(fixed, along) } else { DVec2::new(along, fixed) };
-                let pixel = camera.project(uv);
-                let near =
-                    pixel.x > -width && pixel.x < 2.0 * width && pixel.y > -height && pixel.y < 2.0 * height;
-                if near && camera.lens.contains(uv) {
-                    run.push(viewport.screen(pixel.x, pixel.y));
-                } else {
-                    painter.add(Shape::line(std::mem::take(&mut run), stroke));
-                }
+    let line = |rays: &mut dyn Iterator<Item = DVec3>| {
+        let mut run: Vec<Pos2> = Vec::new();
+        for ray in rays {
+            let pixel = camera.project_ray(ray);
+            let near =
+                pixel.x > -width && pixel.x < 2.0 * width && pixel.y > -height && pixel.y < 2.0 * height;
+            if near && camera.lens.contains_ray(ray) {
+                run.push(viewport.screen(pixel.x, pixel.y));
+            } else {
+                painter.add(Shape::line(std::mem::take(&mut run), stroke));
             }
-            painter.add(Shape::line(run, stroke));
+        }
+        painter.add(Shape::line(run, stroke));
+    };
+    // Barrel distortion shows rays far beyond a pinhole's frame.
+    let (axes, step) = match faces {
+        [] => (vec![glam::DQuat::IDENTITY], width / camera.focal_px.x / f64::from(GRID_LINES)),
+        faces => (faces.iter().map(|face| face.camera_from_face()).collect(), 1.0 / f64::from(FACE_LINES)),
+    };
+    let reach = if faces.is_empty() { GRID_LINES } else { FACE_LINES };
+    let ratio = f64::from(2 * reach) / f64::from(GRID_POINTS);
+    for camera_from_axes in axes {
+        for fixed in -reach..=reach {
+            for upright in [true, false] {
+                let fixed = f64::from(fixed) * step;
+                let ray = |point: i32| {
+                    let along = (f64::from(point) * ratio - f64::from(reach)) * step;
+                    let [u, v] = if upright { [fixed, along] } else { [along, fixed] };
+                    camera_from_axes * DVec3::new(u, v, 1.0)
+                };
+                line(&mut (0..=GRID_POINTS).map(ray));
+            }
         }
     }
 }
@@ -150,35 +183,44 @@ fn row_times(painter: &Painter, viewport: &ImageViewport, camera: &camsim_core::
     }
 }
 
-/// Colour scale of predicted errors, with the bound for the whole frame.
-fn error_scale(painter: &Painter, map: &ErrorMap, total_px: f64) {
+/// Colour scale of predicted errors, which ends at the bound for 99 % of the frame's pixels.
+fn error_scale(painter: &Painter, map: &ErrorMap, bound_px: f64) {
     let largest_px = map.known().map(|(_, px)| px).fold(0.0, f64::max);
-    let least = format!("{:.1e}", largest_px * 10.0_f64.powf(-DECADES));
-    let most = format!("{largest_px:.1e} px predicted; grey: silhouettes");
-    color_scale(
-        painter,
-        [least, most],
-        &format!("99 % of the frame's pixels within {total_px:.4} px"),
-        |fraction| fraction,
-    );
+    let least = format!("{:.1e}", bound_px * 10.0_f64.powf(-DECADES));
+    let most = format!("{bound_px:.1e} px: 99 % of the pixels are within it");
+    let [r, g, b] = ABOVE_BOUND;
+    let (caption, color) = if largest_px > bound_px {
+        (format!("red: above it, up to {largest_px:.1e} px; grey: silhouettes"), Color32::from_rgb(r, g, b))
+    } else {
+        (format!("largest here {largest_px:.1e} px; grey: silhouettes"), Color32::WHITE)
+    };
+    color_scale(painter, [least, most], (&caption, color), |fraction| fraction);
 }
 
 /// Colour scale of depth.
 fn depth_scale(painter: &Painter, range_m: Option<[f32; 2]>) {
     let ends = range_m
         .map_or_else(|| ["no".into(), "surface".into()], |range_m| range_m.map(|m| format!("{m:.3} m")));
-    color_scale(painter, ends, "planar depth, logarithmic", |fraction| 1.0 - fraction);
+    color_scale(painter, ends, ("planar depth, logarithmic", Color32::WHITE), |fraction| 1.0 - fraction);
 }
 
 /// Draws a colour scale with labels at its ends and a caption, in the lower left corner of the clip
 /// rectangle.
-fn color_scale(painter: &Painter, ends: [String; 2], caption: &str, color: impl Fn(f64) -> f64) {
+fn color_scale(
+    painter: &Painter,
+    ends: [String; 2],
+    (caption, caption_color): (&str, Color32),
+    color: impl Fn(f64) -> f64,
+) {
     // In a wipe each picture has its own scale, on its side of the line.
     let visible = painter.clip_rect();
     let corner = pos2(visible.left() + 6.0, visible.bottom() - 38.0);
-    let galley =
-        |text: &str| painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.0), Color32::WHITE);
-    let ([low_label, high_label], caption) = (ends.map(|text| galley(&text)), galley(caption));
+    let colored = |text: &str, color: Color32| {
+        painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.0), color)
+    };
+    let galley = |text: &str| colored(text, Color32::WHITE);
+    let ([low_label, high_label], caption) =
+        (ends.map(|text| galley(&text)), colored(caption, caption_color));
     let left = low_label.size().x + 6.0;
     let right = left + SCALE_SIZE[0] + 6.0;
     let width = (right + high_label.size().x).max(caption.size().x);
@@ -204,4 +246,29 @@ fn color_scale(painter: &Painter, ends: [String; 2], caption: &str, color: impl 
     ] {
         painter.galley(corner + offset, text, Color32::WHITE);
     }
+}
+
+/// Draws a histogram with logarithmic counts in the lower right corner of the clip rectangle.
+fn draw_histogram(painter: &Painter, histogram: &Histogram) {
+    let visible = painter.clip_rect();
+    let size = vec2(BARS as f32, HISTOGRAM_HEIGHT);
+    let kind = if histogram.is_raw { "raw, DN" } else { "sRGB codes" };
+    let caption = format!("0 to {} ({kind}), {:.2} % at the end", histogram.end - 1, 100.0 * histogram.full);
+    let galley = painter.layout_no_wrap(caption, FontId::proportional(12.0), Color32::WHITE);
+    let box_size = vec2(size.x.max(galley.size().x) + 12.0, size.y + galley.size().y + 14.0);
+    let frame = Rect::from_min_size(visible.right_bottom() - box_size - vec2(6.0, 6.0), box_size);
+    painter.rect_filled(frame, 3.0, Color32::from_black_alpha(190));
+    let most = histogram.counts.iter().flatten().copied().max().unwrap_or(0) as f32;
+    let bottom = frame.top() + 6.0 + size.y;
+    for (counts, color) in histogram.counts.iter().zip(HISTOGRAM_COLORS) {
+        if counts.iter().all(|count| *count == 0) {
+            continue;
+        }
+        let height = |count: u64| size.y * (count as f32).ln_1p() / most.ln_1p().max(1e-6);
+        let points = (0_u16..)
+            .zip(counts)
+            .map(|(bar, count)| pos2(frame.left() + 6.0 + f32::from(bar), bottom - height(*count)));
+        painter.add(Shape::line(points.collect(), Stroke::new(1.0, color)));
+    }
+    painter.galley(pos2(frame.left() + 6.0, bottom + 4.0), galley, Color32::WHITE);
 }

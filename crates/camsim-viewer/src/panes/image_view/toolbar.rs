@@ -53,7 +53,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     if view.compare != Compare::Single {
         ui.horizontal_wrapped(|ui| stages(ui, "B", &mut view.b));
     }
-    let bottom = ui.horizontal_wrapped(|ui| overlays(ui, &mut view)).response.rect.bottom();
+    let has_sensor =
+        state.document.as_ref().is_some_and(|document| document.scenario.camera.sensor.is_some());
+    let bottom = ui.horizontal_wrapped(|ui| overlays(ui, &mut view, has_sensor)).response.rect.bottom();
     ui.data_mut(|data| data.insert_temp(self::height(), bottom - top));
     if view != state.view {
         out.push(Message::View(view));
@@ -127,12 +129,13 @@ fn zoom(ui: &mut Ui, view: &mut View) {
         }
     }
     if view.zoom.is_some() || shown.is_some() {
-        ui.weak(format!("{:.0} %", 100.0 * view.zoom.unwrap_or(current)))
-            .with_tooltip("100 %: one screen pixel per camera pixel");
+        // Not broken between number and sign.
+        let percent = egui::RichText::new(format!("{:.0} %", 100.0 * view.zoom.unwrap_or(current))).weak();
+        ui.add(egui::Label::new(percent).extend()).with_tooltip("100 %: one screen pixel per camera pixel");
     }
 }
 
-fn overlays(ui: &mut Ui, view: &mut View) {
+fn overlays(ui: &mut Ui, view: &mut View, has_sensor: bool) {
     let over = &mut view.overlays;
     ui.weak("over it").with_tooltip("overlays of the pictures");
     ui.toggle_value(&mut over.invalid, "invalid")
@@ -147,4 +150,10 @@ fn overlays(ui: &mut Ui, view: &mut View) {
     ui.toggle_value(&mut over.error, "predicted error")
         .with_tooltip("predicted source error at the planner's probes: bright is large");
     ui.toggle_value(&mut over.depth, "depth").with_tooltip("planar depth instead of colour: near is bright");
+    if has_sensor {
+        ui.toggle_value(&mut over.raw, "raw")
+            .with_tooltip("raw picture of the image sensor: each pixel in the colour of its filter");
+    }
+    ui.toggle_value(&mut over.histogram, "histogram")
+        .with_tooltip("counts of sRGB codes, or of the raw picture's numbers where that is shown");
 }

@@ -20,7 +20,7 @@ const FLAT_TRIANGLES: usize = 2;
 /// ground. Where outer pixels have no ray (beyond the fold of a lens) or hit nothing (beyond the horizon),
 /// the outline is at the last ground towards the border.
 pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<Vec<DVec3>> {
-    let ground_point = |uv: DVec2| ground(scene, pose, pose.ned_from_camera * uv.extend(1.0));
+    let ground_point = |ray: DVec3| ground(scene, pose, pose.ned_from_camera * ray);
     let mut runs: Vec<Vec<DVec3>> = vec![Vec::new()];
     for k in 0..=DIRECTIONS {
         let angle = std::f64::consts::TAU * f64::from(k % DIRECTIONS) / f64::from(DIRECTIONS);
@@ -34,18 +34,17 @@ pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<
     runs
 }
 
-/// The value of `evaluate` at the ray of the outermost pixel, in a direction from the middle of the picture,
+/// The value of `evaluate` at the unit ray of the outermost pixel, in a direction from the middle of the picture,
 /// for which it has one.
 pub fn outermost<T>(
     camera: &CameraModel,
     direction: DVec2,
-    evaluate: impl Fn(DVec2) -> Option<T>,
+    evaluate: impl Fn(DVec3) -> Option<T>,
 ) -> Option<T> {
     let size_px = DVec2::new(f64::from(camera.size_px[0]), f64::from(camera.size_px[1]));
     let half_px = 0.5 * (size_px - 1.0);
     let to_border = (half_px / direction.abs().max(DVec2::splat(1e-12))).min_element();
-    let value_at =
-        |fraction: f64| camera.unproject(half_px + fraction * to_border * direction).and_then(&evaluate);
+    let value_at = |fraction: f64| camera.ray(half_px + fraction * to_border * direction).and_then(&evaluate);
     let fraction = |step: u32| f64::from(step) / f64::from(STEPS);
     let (step, mut best) = (0..=STEPS).rev().find_map(|step| Some((step, value_at(fraction(step))?)))?;
     if step == STEPS {

@@ -339,7 +339,8 @@ impl Editor<'_> {
         let default = (self.facts.field.default)();
         let before = self.value.and_then(Value::as_str).unwrap_or(default.trim_matches('"'));
         let mut chosen = before.to_owned();
-        let combo = egui::ComboBox::from_id_salt(self.key).selected_text(before).show_ui(self.ui, |ui| {
+        let shown = if before.is_empty() { "not set" } else { before };
+        let combo = egui::ComboBox::from_id_salt(self.key).selected_text(shown).show_ui(self.ui, |ui| {
             for word in words {
                 ui.selectable_value(&mut chosen, (*word).to_owned(), *word);
             }

@@ -5,7 +5,7 @@ use eframe::egui::Ui;
 use toml::{Table, Value};
 
 use super::super::{tooltips::WithTooltip, widgets::small_button};
-use super::row;
+use super::{is_below, row};
 use crate::{
     document::Document,
     message::{Message, Outbox},
@@ -44,7 +44,6 @@ pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mu
 
 /// Whether an element of a list belongs to a list within it, which has no editor.
 fn is_in_inner_list(list: &str, element: &str) -> bool {
-    let is_below = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.starts_with('.'));
     keys()
         .iter()
         .filter(|inner| inner.field.kind == ValueKind::Tables)

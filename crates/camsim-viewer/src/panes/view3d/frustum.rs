@@ -63,17 +63,17 @@ impl ViewFrustum {
         );
         let frustum = camera.map(|camera| {
             let ground = map::cached_footprint(ui, sequence, frame, &camera, pose);
-            let middle = outermost(&camera, DVec2::ZERO, Some).unwrap_or_default();
-            let axis_ned = pose.ned_from_camera * middle.extend(1.0).normalize();
+            let middle = outermost(&camera, DVec2::ZERO, Some).unwrap_or(DVec3::Z);
+            let axis_ned = pose.ned_from_camera * middle;
             let hit = map::footprint::ground(&sequence.scene, pose, axis_ned);
             let ground_m = hit.map_or(f64::INFINITY, |hit| hit.distance(pose.position_ned_m));
             let length_m = ground_m.clamp(LENGTH_RANGE[0] * radius_m, LENGTH_RANGE[1] * radius_m);
             // Rays end in a plane across the optical axis; oblique ones are cut off.
-            let ray_end = |uv: DVec2| uv.extend(1.0).clamp_length_max(MAX_RAY_LENGTH) * length_m;
+            let ray_end = |ray: DVec3| ray / ray.z.max(1.0 / MAX_RAY_LENGTH) * length_m;
             let rim = border_rays(&camera)
                 .into_iter()
-                .map(|uv| pose.position_ned_m + pose.ned_from_camera * ray_end(uv));
-            Self { rim: rim.collect(), ground, fov_deg: fov_deg(&camera) }
+                .map(|ray| pose.position_ned_m + pose.ned_from_camera * ray_end(ray));
+            Self { rim: rim.collect(), ground, fov_deg: camera.field_deg() }
         });
         ui.data_mut(|data| {
             data.insert_temp::<FrustumCache>(
@@ -86,7 +86,7 @@ impl ViewFrustum {
 }
 
 /// Outermost rays towards points along the picture's border, clockwise from the upper left corner.
-fn border_rays(camera: &CameraModel) -> Vec<DVec2> {
+fn border_rays(camera: &CameraModel) -> Vec<DVec3> {
     let half = DVec2::new(f64::from(camera.size_px[0].max(2) - 1), f64::from(camera.size_px[1].max(2) - 1));
     let corners =
         [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0)];
@@ -96,17 +96,6 @@ fn border_rays(camera: &CameraModel) -> Vec<DVec2> {
         half * corners[side].lerp(corners[(side + 1) % 4], step)
     });
     along.filter_map(|direction| outermost(camera, direction, Some)).collect()
-}
-
-/// Horizontal, vertical and diagonal angles between opposite outermost rays, degrees.
-fn fov_deg(camera: &CameraModel) -> [f64; 3] {
-    let [width, height] = camera.size_px.map(f64::from);
-    let ray = |direction: DVec2| outermost(camera, direction, Some).map(|uv| uv.extend(1.0));
-    let between = |direction: DVec2| match (ray(direction), ray(-direction)) {
-        (Some(a), Some(b)) => a.angle_between(b).to_degrees(),
-        _ => f64::NAN,
-    };
-    [DVec2::X, DVec2::Y, DVec2::new(width - 1.0, height - 1.0)].map(between)
 }
 
 #[cfg(test)]
@@ -127,29 +116,23 @@ mod tests {
     }
 
     #[test]
-    fn pinhole_field_of_view_follows_from_the_focal_length() {
-        // 100, 50 and sqrt(100^2 + 50^2) px from the middle to the border.
-        let expected = [100.0, 50.0, 111.803_398_875].map(|px: f64| 2.0 * (px / 100.0).atan().to_degrees());
-        for (angle_deg, expected) in fov_deg(&camera(&[])).into_iter().zip(expected) {
-            assert!((angle_deg - expected).abs() < 1e-6, "{angle_deg} {expected}");
-        }
+    fn rim_of_a_pinhole_is_the_border_of_its_picture() {
         let rim = border_rays(&camera(&[]));
         assert_eq!(rim.len(), 4 * RAYS_PER_SIDE as usize);
         let corners = [[-1.0, -0.5], [1.0, -0.5], [1.0, 0.5], [-1.0, 0.5]];
         for (side, corner) in corners.into_iter().enumerate() {
-            assert!(
-                (rim[side * RAYS_PER_SIDE as usize] - DVec2::from_array(corner)).length() < 1e-9,
-                "{side}: {rim:?}"
-            );
+            let ray = rim[side * RAYS_PER_SIDE as usize];
+            let away = (ray.truncate() / ray.z - DVec2::from_array(corner)).length();
+            assert!(away < 1e-9, "{side}: {rim:?}");
         }
     }
 
     #[test]
-    fn field_of_view_ends_at_the_fold_of_the_lens() {
-        // r (1 - r^2 / 4) grows up to r = sqrt(4 / 3), 77 px of the 100 to the left border.
-        let [across, down, _] = fov_deg(&camera(&[-0.25, 0.0, 0.0, 0.0]));
-        let fold_deg = 2.0 * (4.0_f64 / 3.0).sqrt().atan().to_degrees();
-        assert!(across > 0.9 * fold_deg && across <= fold_deg + 1e-6, "{across} of {fold_deg}");
-        assert!(down > 53.13 && down < fold_deg, "wider than the pinhole's 53.13: {down}");
+    fn rim_of_a_wide_lens_reaches_behind_the_camera() {
+        let focal_px = 100.0 / 100_f64.to_radians();
+        let wide = CameraModel::new([201, 201], [focal_px; 2], None, LensModel::KannalaBrandt, &[]);
+        let rim = border_rays(&wide.expect("a camera"));
+        let least_z = rim.iter().map(|ray| ray.z).fold(1.0, f64::min);
+        assert!(least_z < -0.17 && rim.len() == 4 * RAYS_PER_SIDE as usize, "{rim:?}");
     }
 }
