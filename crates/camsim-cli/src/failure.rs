@@ -117,6 +117,7 @@ impl<E: std::error::Error + Send + Sync + 'static> From<RenderError<E>> for Fail
             RenderError::Gpu(error) => error.into(),
             RenderError::Plan(error) => Self::bad_input(error),
             moving @ RenderError::Moving => Self::bad_input(moving),
+            cancelled @ RenderError::Cancelled => Self::failed(cancelled),
             RenderError::Sink(error) => Self::failed(error),
         }
     }

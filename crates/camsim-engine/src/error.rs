@@ -17,6 +17,9 @@ pub enum RenderError<E: std::error::Error + 'static> {
          \"default\", or leave motion out"
     )]
     Moving,
+    /// The frame was cancelled ([`crate::Session::set_cancel`]).
+    #[error("the frame was cancelled")]
+    Cancelled,
     /// The sink failed.
     #[error(transparent)]
     Sink(E),
@@ -31,7 +34,8 @@ impl<E: std::error::Error + 'static> RenderError<E> {
         match base {
             RenderError::Gpu(error) => Self::Gpu(error),
             RenderError::Plan(error) => Self::Plan(error),
-            RenderError::Moving => RenderError::Moving,
+            RenderError::Moving => Self::Moving,
+            RenderError::Cancelled => Self::Cancelled,
             RenderError::Sink(never) => match never {},
         }
     }

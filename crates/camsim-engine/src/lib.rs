@@ -27,6 +27,7 @@
 #![warn(missing_docs)]
 
 mod camera_reference;
+mod cancel;
 mod engine;
 mod error;
 mod finished;

@@ -21,7 +21,7 @@ use camsim_core::{scene::Scene, sequence::Sequence, shutter::RowAxis};
 use camsim_cpu::MovingCaster;
 use camsim_plan::FramePlan;
 
-use crate::truth::RAYS;
+use crate::{cancel::Cancel, truth::RAYS};
 pub(crate) use lamps::Lamps;
 pub use lamps::SMALL_LAMP_PX;
 pub(crate) use missed::Missed;
@@ -66,7 +66,7 @@ impl MovingScene {
     }
 
     /// Replaces the colours of the pixels in which something may move: linear R G B A, row-major.
-    pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan) {
+    pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan, cancel: &Cancel) {
         let Sequence { scene, path, .. } = &*self.painter.sequence;
         let swept = sweep::all_that_moves(scene, plan.window_s);
         let outline = Outline::new(path, plan, &swept);
@@ -76,7 +76,7 @@ impl MovingScene {
         }
         let caster = self.painter.caster();
         let line = |line: usize, before: &[f32]| self.line(caster, plan, line, &outline.spans[line], before);
-        Painter::paint(color_rgba, lines, line);
+        Painter::paint(color_rgba, lines, cancel, line);
     }
 
     /// Colours of the pixels of a row of the readout that are in an outline, by their index.

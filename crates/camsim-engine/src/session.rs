@@ -1,6 +1,10 @@
 //! One sequence: its frames in the order asked for.
 
-use std::{collections::VecDeque, sync::Arc, time::Instant};
+use std::{
+    collections::VecDeque,
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
 
 use camsim_core::{
     frame::{Plane, RenderedFrame},
@@ -20,6 +24,7 @@ use camsim_plan::{
 
 use crate::{
     Engine, Finished, FrameTimes, RenderError,
+    cancel::Cancel,
     error::RenderErrorBase,
     finished,
     lane::{CacheKey, CachedFrames, Lane, add_part, joined, turn_to_camera_axes},
@@ -47,6 +52,7 @@ pub struct Session<'a> {
     /// What each pixel of a frame sees; its memory is kept from frame to frame.
     hits: Vec<Option<PixelHit>>,
     stages: WholeFrame,
+    cancel: Cancel,
 }
 
 /// Location of the ideal frame of a frame in flight.
@@ -106,6 +112,7 @@ impl<'a> Session<'a> {
             channels: channels.into(),
             hits: Vec::new(),
             stages,
+            cancel: Cancel::default(),
         })
     }
 
@@ -124,7 +131,8 @@ impl<'a> Session<'a> {
         let still = moving.as_ref().map_or(&sequence, MovingScene::still).clone();
         let (old, new) = (&before.scenario, &sequence.scenario);
         if !Arc::ptr_eq(&before.scene, &still.scene) || old.quality.preset != new.quality.preset {
-            *self = self.engine.session(sequence, channels)?;
+            let cancel = self.cancel.clone();
+            *self = Self { cancel, ..self.engine.session(sequence, channels)? };
             return Ok(());
         }
         let scene_planner = match &self.scene_planner {
@@ -167,6 +175,17 @@ impl<'a> Session<'a> {
     pub fn set_looked_up_coords(&mut self, looked_up: bool) {
         self.looks_up_coords = looked_up;
         self.cpu.set_leaves_truth(!looked_up);
+    }
+
+    /// Frames are cancelled while this is `true`: [`Session::render`] ends with [`RenderError::Cancelled`] before
+    /// its next stage (plan, ideal frame, output frame), or within the rays of things that move. The session
+    /// remains usable.
+    pub fn set_cancel(&mut self, cancel: Arc<AtomicBool>) {
+        self.cancel = Cancel(Some(cancel));
+    }
+
+    fn check_cancel(&self) -> Result<(), RenderErrorBase> {
+        if self.cancel.is_set() { Err(RenderError::Cancelled) } else { Ok(()) }
     }
 
     /// Has the cpu use its general code for every pass that it makes ([`CpuRenderer::set_general_only`]): for
@@ -260,6 +279,7 @@ impl<'a> Session<'a> {
     /// Draws ideal frames on the cpu, or submits the gpu passes of a frame.
     // Long because: one path through both renderers.
     fn submit(&mut self, job: Job, prepared: Prepared, slot: usize) -> Result<InFlight, RenderErrorBase> {
+        self.check_cancel()?;
         let plan = &prepared.plan;
         let planner = self.planner.lane(job.lane);
         let lane = &mut self.lanes[job.lane];
@@ -328,6 +348,10 @@ impl<'a> Session<'a> {
     // Long because: one path through both renderers.
     fn finish(&mut self, done: InFlight) -> Result<Finished, RenderErrorBase> {
         let InFlight { job, prepared: Prepared { plan, rows, .. }, uniforms, source, lod, mut times } = done;
+        // The gpu's frames are waited for, since their buffers are used again.
+        if matches!(source, FrameLocation::Cpu(_)) {
+            self.check_cancel()?;
+        }
         let inputs = ReverseInputs { plan: &plan, uniforms: &uniforms, rows: &rows };
         let begin = Instant::now();
         if let (Some(gpu), FrameLocation::Gpu(submitted) | FrameLocation::Copied(submitted, _)) =
@@ -358,6 +382,7 @@ impl<'a> Session<'a> {
         }
         let begin = Instant::now();
         let frame = self.with_truth(job.lane, &plan, color_rgba, truth)?;
+        self.check_cancel()?;
         times.read_ms += ms_since(begin);
         let mut out_of_order = 0;
         if let (Some(gpu), FrameLocation::Gpu(submitted) | FrameLocation::Copied(submitted, _)) =
@@ -380,12 +405,12 @@ impl<'a> Session<'a> {
         let sequence = self.planner.lane(lane).sequence().clone();
         let is_other = is_red_or_blue(plan);
         let whole = self.scene_planner().lane(lane).sequence().clone();
-        self.lanes[lane].missed.paint(&mut color_rgba, truth.as_mut(), plan, &whole);
+        self.lanes[lane].missed.paint((&mut color_rgba, truth.as_mut()), plan, &whole, &self.cancel);
         if let Some(moving) = &self.lanes[lane].moving {
-            moving.paint(&mut color_rgba, plan);
+            moving.paint(&mut color_rgba, plan, &self.cancel);
         }
         if let Some(lamps) = &self.lanes[lane].lamps {
-            lamps.paint(&mut color_rgba, plan);
+            lamps.paint(&mut color_rgba, plan, &self.cancel);
         }
         let mut planes = Vec::new();
         if let Some(truth) = &mut truth {

@@ -8,7 +8,7 @@ use std::{
     ops::Range,
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
 };
 
@@ -243,4 +243,26 @@ fn lost_device_is_an_error() {
     let made = engine.session::<Infallible>(sequence, &[Channel::Color]);
     let rendered = made.and_then(|mut session| session.render::<Infallible>([0], &mut |_: Finished| Ok(())));
     rendered.expect_err("a session of a lost device");
+}
+
+#[test]
+fn a_cancelled_frame_leaves_the_session_usable() {
+    let engine = Engine::cpu();
+    let picture = |session: &mut camsim_engine::Session<'_>| {
+        let mut came = Vec::new();
+        let outcome = session.render::<Infallible>([3], &mut |finished| {
+            came = finished.frame.into_color();
+            Ok(())
+        });
+        (came, outcome)
+    };
+    let mut session = engine.session::<Infallible>(plain(false), &[Channel::Color]).expect("session");
+    let cancel = Arc::new(AtomicBool::new(true));
+    session.set_cancel(cancel.clone());
+    let (came, outcome) = picture(&mut session);
+    assert!(matches!(outcome, Err(RenderError::Cancelled)) && came.is_empty(), "{outcome:?}");
+    cancel.store(false, Ordering::Relaxed);
+    let again = picture(&mut session).0;
+    let mut fresh = engine.session::<Infallible>(plain(false), &[Channel::Color]).expect("session");
+    assert!(!again.is_empty() && again == picture(&mut fresh).0);
 }

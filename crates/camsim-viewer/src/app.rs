@@ -139,7 +139,9 @@ impl Viewer {
         if let Some(request) = &request
             && self.last_request.as_ref() != Some(request)
         {
-            self.engine.request_frame(request.clone());
+            // Play shows full frames as they come.
+            let is_other = self.last_request.as_ref().is_some_and(|last| !last.is_same_frame(request));
+            self.engine.request_frame(request.clone(), is_other && !self.state.timeline.playing);
         }
         self.last_request = request;
         let Some(request) = self.state.reference_request() else { return };

@@ -90,9 +90,13 @@ impl EngineHandle {
         Self { previews, full_frames, reference, scenarios, replies, threads }
     }
 
-    /// Replaces the request to the renderer. A preview also withdraws a full frame that has not begun.
-    pub fn request_frame(&self, request: FrameRequest) {
+    /// Replaces the request to the renderer. A preview also withdraws a full frame that has not begun. `cancels`
+    /// says whether a full frame in progress is not wanted any more.
+    pub fn request_frame(&self, request: FrameRequest, cancels: bool) {
         self.scenarios.announce(request.reload_count);
+        if cancels {
+            self.full_frames.cancel();
+        }
         match request.size {
             Size::Preview => {
                 self.full_frames.clear();

@@ -43,10 +43,11 @@ impl FrameRateMonitor {
             let rate = f64::from(self.passes) / elapsed.as_secs_f64();
             let preview_ms = state.engine.preview_ms.unwrap_or_default();
             let full_ms = state.engine.full_ms.unwrap_or_default();
+            let settled_ms = 1e3 * state.settled_in_s.unwrap_or_default();
             let longest_ms = 1e3 * self.longest.as_secs_f64();
             eprintln!(
                 "{rate:.1} passes/s, longest {longest_ms:.0} ms; last preview {preview_ms:.0} ms, \
-                 last full frame {full_ms:.0} ms"
+                 last full frame {full_ms:.0} ms, settled after {settled_ms:.0} ms"
             );
             (self.report_began, self.passes, self.longest) = (now, 0, Duration::ZERO);
         }

@@ -27,7 +27,7 @@ pub fn render_headless(scenario: &Path, frame: u64) -> anyhow::Result<HeadlessFr
         // Replies after the picture are ignored.
         let _ = wake.send(());
     });
-    engine.request_frame(FrameRequest {
+    let request = FrameRequest {
         scenario,
         reload_count: 0,
         frame,
@@ -38,7 +38,8 @@ pub fn render_headless(scenario: &Path, frame: u64) -> anyhow::Result<HeadlessFr
         histogram: false,
         errors: false,
         gain: None,
-    });
+    };
+    engine.request_frame(request, false);
     loop {
         woken.recv().context("the renderer's threads have ended")?;
         for reply in engine.replies() {

@@ -93,6 +93,8 @@ pub struct State {
     last_input_s: f64,
     /// egui's time since when the wanted picture has not been shown, seconds.
     pending_since_s: Option<f64>,
+    /// Time for which the last wanted picture was missing, seconds.
+    pub settled_in_s: Option<f64>,
 }
 
 impl State {
@@ -122,8 +124,10 @@ impl State {
     /// Notes whether the wanted picture is shown; play wants another one all the time.
     pub fn note_pending(&mut self) {
         let is_pending = self.is_pending() && !(self.timeline.playing && self.engine.fault.is_none());
-        let since_s = self.pending_since_s.unwrap_or(self.now_s);
-        self.pending_since_s = is_pending.then_some(since_s);
+        if !is_pending && let Some(since_s) = self.pending_since_s {
+            self.settled_in_s = Some(self.now_s - since_s);
+        }
+        self.pending_since_s = is_pending.then_some(self.pending_since_s.unwrap_or(self.now_s));
     }
 
     /// Records an input at the present time.

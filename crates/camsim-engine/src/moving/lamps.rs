@@ -24,7 +24,10 @@ use super::{
     outline::{self, Swept},
     painter::{Painted, Painter, index},
 };
-use crate::truth::{RAYS, ray};
+use crate::{
+    cancel::Cancel,
+    truth::{RAYS, ray},
+};
 
 /// Longest side of the box, in the picture, of a lamp that gets rays of its own, pixels. Of larger ones the
 /// borders are a small part.
@@ -96,7 +99,7 @@ impl Lamps {
     }
 
     /// Replaces the colours of the pixels that small lamps may reach: linear R G B A, row-major.
-    pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan) {
+    pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan, cancel: &Cancel) {
         let Sequence { scene, path, .. } = &*self.painter.sequence;
         let meshes = self.numbers.iter().map(|&number| &scene.meshes[number]);
         let small: Vec<Small<'_>> = meshes.filter_map(|mesh| self.small(plan, mesh)).collect();
@@ -119,7 +122,7 @@ impl Lamps {
         }
         // Made here: nothing waits for it within the loop.
         let caster = self.painter.caster();
-        Painter::paint(color_rgba, lines, |line, before| self.line(caster, plan, &line, before));
+        Painter::paint(color_rgba, lines, cancel, |line, before| self.line(caster, plan, &line, before));
     }
 
     /// A lamp, if it is small in a frame and in view.

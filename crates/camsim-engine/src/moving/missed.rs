@@ -14,6 +14,7 @@ use camsim_plan::{FramePlan, uniforms::Truth};
 use glam::DVec2;
 
 use super::painter::{Painter, index};
+use crate::cancel::Cancel;
 
 /// The missed pixels of a lane.
 #[derive(Debug, Default)]
@@ -29,10 +30,10 @@ impl Missed {
     /// ray. `sequence` has everything in the scene.
     pub fn paint(
         &mut self,
-        color_rgba: &mut [f32],
-        truth: Option<&mut Vec<Truth>>,
+        (color_rgba, truth): (&mut [f32], Option<&mut Vec<Truth>>),
         plan: &FramePlan,
         sequence: &Arc<Sequence>,
+        cancel: &Cancel,
     ) {
         if plan.preset == Preset::Paper {
             return;
@@ -44,7 +45,7 @@ impl Missed {
         let painter = self.painter.get_or_insert_with(|| Painter::new(sequence, None));
         let caster = painter.caster();
         let pixels = missed.iter().map(|(pixel, _)| *pixel).collect();
-        Painter::paint(color_rgba, pixels, |pixel, _| painter.means(caster, plan, &[pixel]));
+        Painter::paint(color_rgba, pixels, cancel, |pixel, _| painter.means(caster, plan, &[pixel]));
         missed.iter().for_each(|(pixel, _)| color_rgba[4 * index(plan, *pixel) + 3] = 1.0);
         if let Some(truth) = truth {
             for (pixel, uv) in missed {

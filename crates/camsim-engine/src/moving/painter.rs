@@ -12,7 +12,10 @@ use camsim_plan::FramePlan;
 use glam::{DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
-use crate::truth::{RAYS, ray};
+use crate::{
+    cancel::Cancel,
+    truth::{RAYS, ray},
+};
 
 /// What is painted with: rays through everything in a scene, and what follows the light of a pixel.
 #[derive(Debug)]
@@ -74,14 +77,17 @@ impl Painter {
         (i, photometric(stage, light.to_array(), weight, pixel, picture, seed, &self.noise_table))
     }
 
-    /// Replaces the colours that `line` gives for a row of the readout: linear R G B A, row-major.
+    /// Replaces the colours that `line` gives for a row of the readout: linear R G B A, row-major. Once cancelled,
+    /// some are left out.
     pub fn paint<T: Send>(
         color_rgba: &mut [f32],
         lines: Vec<T>,
+        cancel: &Cancel,
         line: impl Fn(T, &[f32]) -> Vec<Painted> + Sync,
     ) {
         let before: &[f32] = color_rgba;
-        let painted: Vec<Vec<Painted>> = lines.into_par_iter().map(|each| line(each, before)).collect();
+        let line = |each| if cancel.is_set() { Vec::new() } else { line(each, before) };
+        let painted: Vec<Vec<Painted>> = lines.into_par_iter().map(line).collect();
         for (i, color) in painted.into_iter().flatten() {
             color_rgba[4 * i..4 * i + 3].copy_from_slice(&color);
         }

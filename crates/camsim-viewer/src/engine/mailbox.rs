@@ -1,12 +1,17 @@
 //! A channel that holds only the latest request.
 
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::{
+    Arc, Condvar, Mutex, PoisonError,
+    atomic::{AtomicBool, Ordering},
+};
 
 /// Holds the latest request until a thread takes it.
 #[derive(Debug)]
 pub struct Mailbox<T> {
     state: Mutex<MailboxState<T>>,
     arrived: Condvar,
+    /// Whether work in progress is to be cancelled.
+    cancel: Arc<AtomicBool>,
 }
 
 #[derive(Debug)]
@@ -17,7 +22,8 @@ struct MailboxState<T> {
 
 impl<T> Default for Mailbox<T> {
     fn default() -> Self {
-        Self { state: Mutex::new(MailboxState { request: None, closed: false }), arrived: Condvar::new() }
+        let state = Mutex::new(MailboxState { request: None, closed: false });
+        Self { state, arrived: Condvar::new(), cancel: Arc::default() }
     }
 }
 
@@ -33,6 +39,17 @@ impl<T> Mailbox<T> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).request = None;
     }
 
+    /// Cancels work in progress; the next request that is taken begins anew.
+    pub fn cancel(&self) {
+        let _state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        self.cancel.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether work in progress is cancelled, to be looked at from elsewhere.
+    pub fn cancelled(&self) -> Arc<AtomicBool> {
+        self.cancel.clone()
+    }
+
     /// Waits for a request; `None` once the mailbox is closed.
     pub fn take(&self) -> Option<T> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -41,6 +58,7 @@ impl<T> Mailbox<T> {
                 return None;
             }
             if let Some(request) = state.request.take() {
+                self.cancel.store(false, Ordering::Relaxed);
                 return Some(request);
             }
             state = self.arrived.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -56,6 +74,7 @@ impl<T> Mailbox<T> {
     /// Ends [`Mailbox::take`] in all threads.
     pub fn close(&self) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
+        self.cancel.store(true, Ordering::Relaxed);
         self.arrived.notify_all();
     }
 }
@@ -73,6 +92,11 @@ mod tests {
         assert!(mailbox.has_newer());
         assert_eq!(mailbox.take(), Some(2));
         assert!(!mailbox.has_newer());
+        mailbox.cancel();
+        assert!(mailbox.cancelled().load(Ordering::Relaxed));
+        mailbox.put(7);
+        assert_eq!(mailbox.take(), Some(7));
+        assert!(!mailbox.cancelled().load(Ordering::Relaxed), "a new request begins anew");
         mailbox.put(7);
         mailbox.clear();
         assert!(!mailbox.has_newer());

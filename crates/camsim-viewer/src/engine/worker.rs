@@ -3,7 +3,7 @@
 use std::{
     convert::Infallible,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
     time::Instant,
 };
 
@@ -82,6 +82,7 @@ fn run_on(
             engine: &engine,
             reply_sender,
             scenarios,
+            cancel: mailbox.cancelled(),
             session: None,
             cache: Vec::new(),
             rendered: 0,
@@ -91,6 +92,10 @@ fn run_on(
             // wgpu panics if the device is lost while a resource is created.
             let served = catch_unwind(AssertUnwindSafe(|| worker.serve(&request, mailbox)))
                 .unwrap_or(Err(Fault::Stopped));
+            // A newer request waits, or the preview of one is being rendered.
+            if matches!(served, Err(Fault::Render(RenderError::Cancelled))) {
+                continue;
+            }
             let Err(fault) = served else {
                 if lost_request.take().is_some_and(|lost| lost == request) {
                     reply_sender.send(Reply::Notice(
@@ -125,6 +130,8 @@ struct Worker<'a> {
     engine: &'a Engine,
     reply_sender: &'a ReplySender,
     scenarios: &'a ScenarioCache,
+    /// Whether the frame in progress is not wanted any more.
+    cancel: Arc<AtomicBool>,
     session: Option<Session<'a>>,
     cache: Vec<CachedPicture>,
     /// Frames rendered so far.
@@ -320,7 +327,8 @@ impl<'a> Worker<'a> {
             }
             none => {
                 self.reply_sender.send(Reply::Busy("preparing the renderer".into()));
-                let session = self.engine.session::<Infallible>(sequence.clone(), channels)?;
+                let mut session = self.engine.session::<Infallible>(sequence.clone(), channels)?;
+                session.set_cancel(self.cancel.clone());
                 self.reply_sender.send(Reply::Busy(String::new()));
                 none.insert(session)
             }

@@ -133,7 +133,9 @@ fn frame(state: &State) -> String {
 /// Marks a picture that is not the wanted one.
 fn pending(ui: &mut Ui, state: &State, pane: Rect) {
     let Some(pending_s) = state.pending_s() else { return };
-    let text = format!("rendering frame {}, {pending_s:.0} s{}", state.timeline.frame, usual_time(state));
+    let since =
+        if pending_s < 1.0 { String::new() } else { format!(", {pending_s:.0} s{}", usual_time(state)) };
+    let text = format!("rendering frame {}{since}", state.timeline.frame);
     let galley = ui.painter().layout_no_wrap(text.clone(), FontId::proportional(13.0), Color32::WHITE);
     let height = ui.spacing().interact_size.y;
     let size = egui::vec2(galley.size().x + height + 16.0, height + 6.0);

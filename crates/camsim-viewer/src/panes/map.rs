@@ -8,7 +8,7 @@ use std::sync::{Arc, Weak};
 
 use camsim_core::{camera::CameraModel, pose::CameraPose, sequence::Sequence};
 use eframe::egui::{
-    Color32, Id, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+    Align2, Color32, FontId, Id, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 use glam::{DVec2, DVec3};
 
@@ -22,6 +22,8 @@ use crate::{
 
 const CAMERA_COLOR: Color32 = Color32::from_rgb(255, 140, 40);
 const OBJECT_COLOR: Color32 = Color32::from_rgb(120, 230, 255);
+/// Colour of what moves.
+pub const MOVING_COLOR: Color32 = Color32::from_rgb(255, 120, 220);
 /// Length of the rays at the picture's left and right border, as a fraction of the map.
 const VIEW_RAY_SHARE: f64 = 0.08;
 
@@ -47,6 +49,12 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     background(&painter, &map, ui.visuals().text_color(), &screen);
+    for thing in static_map::moving(&sequence.scene, stamp_s) {
+        let rect = box_from_above(&thing.corners, &screen);
+        painter.rect_filled(rect, 0.0, MOVING_COLOR);
+        let font = FontId::proportional(11.0);
+        painter.text(rect.right_top(), Align2::LEFT_BOTTOM, &thing.name, font, MOVING_COLOR);
+    }
     let pose = sequence.path.pose(stamp_s);
     if let Some(camera) = motion::camera_model(&sequence.scenario.camera) {
         let footprint = cached_footprint(ui, sequence, state.timeline.frame, &camera, &pose);
@@ -78,10 +86,8 @@ fn background(painter: &Painter, map: &StaticMap, text: Color32, screen: &impl F
         let corners = Rect::from_two_pos(screen(map.bounds[0]), screen(map.bounds[1]));
         painter.image(relief.id(), corners, uv, Color32::WHITE);
     }
-    for [low, high] in map.boxes.iter() {
-        let rect = Rect::from_two_pos(screen(low.truncate()), screen(high.truncate()));
-        let visible = Rect::from_center_size(rect.center(), rect.size().max(vec2(2.0, 2.0)));
-        painter.rect_filled(visible, 0.0, OBJECT_COLOR.gamma_multiply(0.6));
+    for corners in map.boxes.iter() {
+        painter.rect_filled(box_from_above(corners, screen), 0.0, OBJECT_COLOR.gamma_multiply(0.6));
     }
     for corners in map.flats.iter() {
         painter.add(Shape::closed_line(
@@ -93,6 +99,12 @@ fn background(painter: &Painter, map: &StaticMap, text: Color32, screen: &impl F
     // The relief is dark in both themes.
     let color = if map.relief.is_some() { Color32::WHITE } else { text };
     painter.add(Shape::line(points, Stroke::new(1.5, color)));
+}
+
+/// A box from above, large enough to be seen.
+fn box_from_above([low, high]: &[DVec3; 2], screen: &impl Fn(DVec2) -> Pos2) -> Rect {
+    let rect = Rect::from_two_pos(screen(low.truncate()), screen(high.truncate()));
+    Rect::from_center_size(rect.center(), rect.size().max(vec2(2.0, 2.0)))
 }
 
 /// Draws the camera, its footprint, and the rays at its left and right border.

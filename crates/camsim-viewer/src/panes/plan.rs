@@ -31,7 +31,7 @@ pub fn show(ui: &mut Ui, state: &State) {
                 ui.strong(format!("{} face", face.name()));
             }
             passes(ui, plan);
-            errors(ui, plan, &name, has_terrain);
+            errors(ui, plan, has_terrain);
             skipped(ui, plan, &name);
         }
         ui.separator();
@@ -87,7 +87,7 @@ fn passes(ui: &mut Ui, plan: &FramePlan) {
 }
 
 /// Predicted errors, and whether they are within the scenario's tolerances.
-fn errors(ui: &mut Ui, plan: &FramePlan, name: &str, has_terrain: bool) {
+fn errors(ui: &mut Ui, plan: &FramePlan, has_terrain: bool) {
     let predicted = &plan.predicted;
     if predicted.probes == 0 {
         verdict(ui, false, Some("no probe has a source in the ideal frame: the picture is empty"));

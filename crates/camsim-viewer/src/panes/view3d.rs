@@ -19,7 +19,10 @@ use self::{
     static_scene::{StaticScene, static_scene},
 };
 use super::{
-    map::static_map::{self, StaticMap},
+    map::{
+        MOVING_COLOR,
+        static_map::{self, MovingThing, StaticMap},
+    },
     number_field::{self, NumberField},
     tooltips::WithTooltip,
     widgets::{fact, fixed, small_button},
@@ -82,7 +85,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     }
     let frustum = ViewFrustum::cached(ui, state, &loaded.sequence, &pose, scene.sphere.radius_m);
     let eye = Eye::new(&orbit, scene.sphere, pane);
-    draw(ui, rect, &eye, &scene, &map, frustum.as_ref(), pose.position_ned_m);
+    let moving = static_map::moving(&loaded.sequence.scene, stamp_s);
+    draw(ui, rect, &eye, &scene, &map, &moving, frustum.as_ref(), pose.position_ned_m);
     legend(ui, &map, frustum.as_ref(), pose.position_ned_m, state.timeline.frame);
     if let Some(clicked) = response.interact_pointer_pos().filter(|_| response.clicked())
         && let Some(after_s) = nearest(&eye, &map, clicked - rect.center())
@@ -172,6 +176,7 @@ fn draw(
     eye: &Eye,
     scene: &StaticScene,
     map: &StaticMap,
+    moving: &[MovingThing],
     frustum: Option<&ViewFrustum>,
     camera_ned_m: DVec3,
 ) {
@@ -187,6 +192,7 @@ fn draw(
     }
     let outlined = map.boxes.len() <= static_scene::MAX_OUTLINED;
     map.boxes.iter().for_each(|corners| canvas.cuboid(*corners, OBJECT_COLOR, outlined));
+    moving.iter().for_each(|thing| canvas.cuboid(thing.corners, MOVING_COLOR, outlined));
     // Log below path: both stay visible where they coincide.
     map.log.iter().for_each(|row| canvas.dot(*row, 3.0, LOG_COLOR, lift_m));
     canvas.line(&map.flown, 2.4, PATH_COLOR, 2.0 * lift_m);
@@ -198,6 +204,13 @@ fn draw(
         canvas.line(&[camera_ned_m, foot], 1.0, Color32::from_gray(170), lift_m);
     }
     painter.add(canvas.mesh());
+    for thing in moving {
+        let eye_m = eye.eye_from_ned(thing.middle_ned_m());
+        if eye_m.z >= eye.near_m() {
+            let at = rect.center() + on_screen(eye.project(eye_m));
+            painter.text(at, Align2::CENTER_BOTTOM, &thing.name, FontId::proportional(11.0), Color32::WHITE);
+        }
+    }
     // The camera is drawn in front of everything.
     let eye_m = eye.eye_from_ned(camera_ned_m);
     if eye_m.z >= eye.near_m() {

@@ -1,6 +1,9 @@
 //! The part of the map that all frames share: track, relief, boards and models.
 
-use std::sync::{Arc, Weak};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Weak},
+};
 
 use camsim_core::{
     camera::CameraModel,
@@ -98,9 +101,11 @@ pub fn static_map(ui: &Ui, loaded: &Loaded) -> StaticMap {
         .map_or_else(|_| Vec::new(), |camera| footprint_points(sequence, &camera));
     let (flats, boxes) = objects(&sequence.scene);
     let from_above = |corners: &[DVec3; 2]| corners.map(DVec3::truncate);
+    let moving_rects =
+        moving(&sequence.scene, sequence.start_s).into_iter().map(|thing| from_above(&thing.corners));
     let bounds = bounds(
         track.iter().map(|(ned, _)| ned.truncate()).chain(footprints),
-        flats.iter().map(bounding_rect).chain(boxes.iter().map(from_above)),
+        flats.iter().map(bounding_rect).chain(boxes.iter().map(from_above)).chain(moving_rects),
     );
     let terrain = sequence.scene.terrain.as_ref();
     let relief = terrain
@@ -135,13 +140,47 @@ fn footprint_points(sequence: &Sequence, camera: &CameraModel) -> Vec<DVec2> {
     (0..=4).flat_map(points).collect()
 }
 
-/// Corners of patterns and boards, and bounding boxes of all other meshes.
+/// Corners of patterns and boards, and bounding boxes of all other meshes that stand still.
 fn objects(scene: &Scene) -> (Vec<[DVec3; 4]>, Vec<[DVec3; 2]>) {
     let flats = flats(scene).map(|mesh| [0, 1, 3, 2].map(|vertex| mesh.position_ned_m(vertex))).collect();
-    let others: Vec<_> = scene.meshes.iter().filter(|mesh| !is_quad(mesh)).collect();
+    let others: Vec<_> = scene.meshes.iter().filter(|mesh| !is_quad(mesh) && mesh.motion.is_none()).collect();
     let every = others.len().div_ceil(MAX_BOXES).max(1);
     let boxes = others.iter().step_by(every).map(|mesh| mesh.bounds()).filter(|bounds| !bounds.is_empty());
     (flats, boxes.map(|bounds| [bounds.min, bounds.max]).collect())
+}
+
+/// An object that moves, at one instant.
+pub struct MovingThing {
+    /// Name of the object; "unnamed" for meshes that belong to none.
+    pub name: String,
+    /// Least and largest coordinates, NED metres.
+    pub corners: [DVec3; 2],
+}
+
+impl MovingThing {
+    /// Middle of the box, NED metres.
+    pub fn middle_ned_m(&self) -> DVec3 {
+        0.5 * (self.corners[0] + self.corners[1])
+    }
+}
+
+/// The objects that move, where they are at a path time; at most [`MAX_BOXES`].
+pub fn moving(scene: &Scene, t_s: f64) -> Vec<MovingThing> {
+    let mut corners: BTreeMap<u32, [DVec3; 2]> = BTreeMap::new();
+    for mesh in &scene.meshes {
+        let Some(bounds) = mesh.motion.as_ref().map(|motion| motion.bounds(&mesh.bounds(), t_s, t_s)) else {
+            continue;
+        };
+        if !bounds.is_empty() {
+            let hull = corners.entry(mesh.object).or_insert([bounds.min, bounds.max]);
+            *hull = [hull[0].min(bounds.min), hull[1].max(bounds.max)];
+        }
+    }
+    let named = corners.into_iter().take(MAX_BOXES).map(|(object, corners)| {
+        let known = object.checked_sub(1).and_then(|index| scene.objects.get(index as usize));
+        MovingThing { name: known.map_or("unnamed", |object| object.name.as_str()).to_owned(), corners }
+    });
+    named.collect()
 }
 
 /// Meshes of patterns and boards, whose vertices are row-major corners.
