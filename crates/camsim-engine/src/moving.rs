@@ -11,6 +11,7 @@ mod missed;
 mod outline;
 mod painter;
 mod sweep;
+mod thing;
 
 /// Rays of a pixel in which something moves.
 pub const MOVING_RAYS: u32 = RAYS;
@@ -27,11 +28,13 @@ pub use lamps::SMALL_LAMP_PX;
 pub(crate) use missed::Missed;
 use outline::Outline;
 use painter::{Painted, Painter, index};
+use thing::{Thing, things};
 
 /// A sequence whose scene has things that move.
 #[derive(Debug)]
 pub(crate) struct MovingScene {
     painter: Painter,
+    things: Arc<Vec<Thing>>,
     /// Without what moves.
     still: Arc<Sequence>,
 }
@@ -56,6 +59,7 @@ impl MovingScene {
         let still = Sequence { scene: still_scene, ..Sequence::clone(sequence) };
         Some(Self {
             painter: Painter::new(sequence, known.map(|before| &before.painter)),
+            things: known.map_or_else(|| Arc::new(things(scene)), |before| before.things.clone()),
             still: Arc::new(still),
         })
     }
@@ -68,7 +72,7 @@ impl MovingScene {
     /// Replaces the colours of the pixels in which something may move: linear R G B A, row-major.
     pub fn paint(&self, color_rgba: &mut [f32], plan: &FramePlan, cancel: &Cancel) {
         let Sequence { scene, path, .. } = &*self.painter.sequence;
-        let swept = sweep::all_that_moves(scene, plan.window_s);
+        let swept = sweep::all_that_moves(scene, &self.things, plan.window_s);
         let outline = Outline::new(path, plan, &swept);
         let lines: Vec<usize> = (0..outline.spans.len()).filter(|&i| !outline.spans[i].is_empty()).collect();
         if lines.is_empty() {

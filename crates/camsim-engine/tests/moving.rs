@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     reference::{ReferenceRenderer, RenderOptions},
-    scenario::{Channel, FieldOr, MountSpec, Preset, Readout, Scenario, ShutterSpec},
+    scenario::{Axis, Channel, FieldOr, MountSpec, Preset, Readout, Scenario, ShutterSpec, VibrationSpec},
     scene::{
         Encoding, Mesh, RigidMotion, Scene, Terrain, Texture,
         motion::{Between, Curve, Joint, JointFrame, Keys, Track},
@@ -148,6 +148,50 @@ fn a_fast_rotor_is_seen_all_around_and_what_is_out_of_view_changes_nothing() {
     assert!(error_dn < gone_dn / 6.0, "{error_dn} of {gone_dn}");
     let behind = with_rotor(DVec3::new(-4000.0, 0.0, -40.0));
     assert_eq!(frame(&behind), without);
+}
+
+/// A narrow blade that turns a little within an exposure, before a camera that shakes several times meanwhile: only
+/// what is near it is cast, and nothing of it is missed.
+#[test]
+fn a_narrow_blade_is_cast_alone_and_seen_by_a_camera_that_shakes() {
+    let shakes = |moves: bool| {
+        camera(moves, |s| {
+            let shake = VibrationSpec {
+                axis: Axis::Roll,
+                amplitude_deg: 8.0,
+                amplitude_m: 0.0,
+                hz: 250.0,
+                phase_deg: 0.0,
+            };
+            s.camera.mount.vibration = vec![shake];
+        })
+    };
+    let without = shakes(false);
+    let centre_ned_m = DVec3::new(10.0, 0.0, -40.0);
+    let frame = JointFrame::from_affine(&DAffine3::from_translation(centre_ned_m)).expect("a frame");
+    let spin = Track::Spin { axis: DVec3::Z, hz: 1.0, phase_rad: 0.3 };
+    let motion = Some(Arc::new(RigidMotion::new(vec![Joint::new(frame, spin)])));
+    let mut scene = Scene::clone(&without.scene);
+    scene.meshes.push(Mesh { motion, origin_ned_m: centre_ned_m, ..roof(50.0, 6.0) });
+    let with = Arc::new(Sequence { scene: Arc::new(scene), ..Sequence::clone(&without) });
+    let cpu = Engine::cpu();
+    let color =
+        |sequence: &Arc<Sequence>| render(&cpu, sequence, &[Channel::Color], FRAME).frame.into_color();
+    let exact = |sequence: &Arc<Sequence>| {
+        let reference = ReferenceRenderer::new(sequence.clone()).expect("a usable camera");
+        let options = RenderOptions { tolerance_dn: 0.3, max_samples: 1024, ..RenderOptions::default() };
+        reference.render(FRAME, &options).into_color()
+    };
+    let (expected, still) = (exact(&with), exact(&without));
+    let (found, without) = (color(&with), color(&without));
+    let red_dn = |a: &[f32], b: &[f32], i: usize| 255.0 * (a[4 * i] - b[4 * i]).abs();
+    let seen: Vec<usize> = (0..found.len() / 4).filter(|&i| red_dn(&expected, &still, i) > 10.0).collect();
+    let missed = seen.iter().filter(|&&i| red_dn(&found, &without, i) == 0.0).count();
+    let cast = (0..found.len() / 4).filter(|&i| found[4 * i..4 * i + 4] != without[4 * i..4 * i + 4]).count();
+    eprintln!("blade: seen by {} px, {missed} missed, {cast} cast", seen.len());
+    assert!(seen.len() > 100 && missed == 0, "{missed} of {}", seen.len());
+    // The disc of all directions has some 900 pixels.
+    assert!(cast < 4 * seen.len(), "{cast} for {}", seen.len());
 }
 
 #[test]

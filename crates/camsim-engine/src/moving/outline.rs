@@ -17,8 +17,12 @@ use super::line_count;
 
 /// Exposure phases of the cameras that boxes are projected by.
 const PHASES: [f64; 3] = [-0.5, 0.0, 0.5];
-/// Room around the projected corners of a box, pixels, and as a fraction of its size: edges that a lens bends and
-/// cameras that shake within an exposure.
+/// Instants within an exposure, per second, at which cameras that shake are looked at, and most of them.
+const SHAKES_HZ: f64 = 2000.0;
+/// How far a camera may shake between [`INSTANTS`], as a fraction of the rows.
+const SHAKE: f64 = 0.1;
+const MOST_STEPS: f64 = 64.0;
+/// Room around the projected corners of a box, pixels, and as a fraction of its size: edges that a lens bends.
 const ROOM_PX: f64 = 2.0;
 const ROOM: f64 = 0.1;
 
@@ -49,15 +53,77 @@ pub(super) fn pixel(plan: &FramePlan, line: usize, along: u32) -> [u32; 2] {
 
 impl Outline {
     pub fn new(path: &CameraPath, plan: &FramePlan, swept: &[Swept]) -> Self {
-        let swept: Vec<Swept> = swept.iter().filter_map(|swept| swept.in_view(path, plan)).collect();
+        let in_view = swept.iter().filter_map(|swept| swept.in_view(path, plan));
+        let shake_px = SHAKE * line_count(plan) as f64;
+        let swept: Vec<Swept> = in_view.map(|swept| swept.within_lines(path, plan, shake_px)).collect();
         let spans = (0..line_count(plan)).into_par_iter().map(|line| {
-            let mut spans: Vec<[u32; 2]> =
-                swept.iter().flat_map(|swept| swept.spans(path, plan, line)).collect();
+            let mut shaken = Shaken::default();
+            let here = swept.iter().filter(|swept| swept.may_be_in(plan, line));
+            let mut spans: Vec<[u32; 2]> = here
+                .flat_map(|swept| {
+                    swept.spans_with_room(path, plan, line, shaken.room_px(swept, path, plan, line))
+                })
+                .collect();
             spans.sort_unstable();
             merged(&spans)
         });
         Self { spans: spans.collect() }
     }
+}
+
+/// How far the camera shakes within the exposure of a row beyond what the cameras at [`PHASES`] show, for each
+/// thing.
+#[derive(Default)]
+struct Shaken {
+    known: Vec<(Aabb, f64)>,
+}
+
+impl Shaken {
+    fn room_px(&mut self, swept: &Swept, path: &CameraPath, plan: &FramePlan, line: usize) -> f64 {
+        let Some(whole) = swept.shaken_as else { return 0.0 };
+        if let Some((_, room_px)) = self.known.iter().find(|(known, _)| *known == whole) {
+            return *room_px;
+        }
+        let room_px = shake_px(path, plan, line, &swept.motion, &whole);
+        self.known.push((whole, room_px));
+        room_px
+    }
+}
+
+/// How far corners of a box are seen, at instants close to each other within the exposure of a row, from the
+/// box around them at [`PHASES`]; pixels.
+fn shake_px(path: &CameraPath, plan: &FramePlan, line: usize, motion: &RigidMotion, bounds: &Aabb) -> f64 {
+    let (mid_s, exposure_s) = exposure_of(plan, line);
+    let steps = (exposure_s * SHAKES_HZ).ceil().min(MOST_STEPS);
+    if exposure_s <= 0.0 {
+        return 0.0;
+    }
+    // Where it is at mid-exposure: how it moves itself is in its bounds.
+    let corners = box_corners(&motion.bounds(bounds, mid_s, mid_s));
+    let seen_at = |phase: f64| {
+        let t_s = mid_s + phase * exposure_s;
+        let pose = path.pose(t_s);
+        corners.map(|corner| plan.camera.show(&pose, t_s, WorldPoint::At(corner)).map(|(px, _)| px))
+    };
+    let mut hulls = [(DVec2::INFINITY, DVec2::NEG_INFINITY); 8];
+    for seen in PHASES.map(seen_at) {
+        for ((low, high), px) in hulls.iter_mut().zip(seen) {
+            (*low, *high) = (low.min(px.unwrap_or(*low)), high.max(px.unwrap_or(*high)));
+        }
+    }
+    let away_px = |step: u32| {
+        let seen = seen_at(f64::from(step) / steps - 0.5);
+        let known = hulls.iter().zip(seen).filter(|((low, _), _)| low.is_finite());
+        let away = known.filter_map(|((low, high), px)| Some((*low - px?).max(px? - *high).max_element()));
+        away.fold(0.0, f64::max)
+    };
+    (0..=steps as u32).map(away_px).fold(0.0, f64::max)
+}
+
+/// Mid-exposure of a row, path time, and its exposure, seconds.
+fn exposure_of(plan: &FramePlan, line: usize) -> (f64, f64) {
+    let [x, y] = pixel(plan, line, 0);
+    (plan.stamp_s + plan.shutter.dt_pixel_s(x, y), plan.shutter.exposure_pixel_s(x, y))
 }
 
 /// Where something that moves may change the picture: where it is itself, and where its shadow may fall.
@@ -72,6 +138,9 @@ pub(super) struct Swept {
     room_px: f64,
     /// First and last position across the rows of the readout at which it may be, pixels.
     across_px: [f64; 2],
+    /// The box whose corners tell how the camera shakes within an exposure: that of all of which it is a part.
+    /// `None` if its room allows for that.
+    shaken_as: Option<Aabb>,
 }
 
 impl Swept {
@@ -82,11 +151,18 @@ impl Swept {
         room_px: f64,
     ) -> Self {
         let across_px = [f64::NEG_INFINITY, f64::INFINITY];
-        Self { motion, bounds, segments_ned_m, room_px: room_px.max(ROOM_PX), across_px }
+        let room_px = room_px.max(ROOM_PX);
+        Self { motion, bounds, segments_ned_m, room_px, across_px, shaken_as: None }
+    }
+
+    /// As a part of something in this box.
+    pub fn shaken_as(self, whole: &Aabb) -> Self {
+        Self { shaken_as: Some(*whole), ..self }
     }
 
     /// With the rows of the readout that it can be in, which spares the others a look.
-    pub fn within_lines(self, path: &CameraPath, plan: &FramePlan) -> Self {
+    /// `room_px` is for how the camera shakes between the instants at which it is looked at.
+    pub fn within_lines(self, path: &CameraPath, plan: &FramePlan, room_px: f64) -> Self {
         let [begin_s, end_s] = plan.window_s;
         let swept = self.motion.bounds(&self.bounds, begin_s, end_s);
         let poses: Vec<(f64, CameraPose)> = (0..=INSTANTS)
@@ -102,6 +178,7 @@ impl Swept {
             .iter()
             .filter_map(|segment| project(plan, &poses, &along(&swept, segment), &self));
         let across_px = all.map(ends).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+        let across_px = across_px.map(|[first, last]| [first - room_px, last + room_px]);
         Self { across_px: across_px.unwrap_or(self.across_px), ..self }
     }
 
@@ -114,7 +191,23 @@ impl Swept {
 
     /// First and last pixels along a row of the readout between which its parts may be.
     pub fn spans(&self, path: &CameraPath, plan: &FramePlan, line: usize) -> Vec<[u32; 2]> {
-        self.project(path, plan, line).iter().filter_map(|projected| span(plan, line, projected)).collect()
+        self.spans_with_room(path, plan, line, 0.0)
+    }
+
+    /// As [`Self::spans`] with more room, pixels.
+    fn spans_with_room(
+        &self,
+        path: &CameraPath,
+        plan: &FramePlan,
+        line: usize,
+        room_px: f64,
+    ) -> Vec<[u32; 2]> {
+        let larger = |Projected { low_px, high_px }: Projected| Projected {
+            low_px: low_px - room_px,
+            high_px: high_px + room_px,
+        };
+        let projected = self.project(path, plan, line).into_iter().map(larger);
+        projected.filter_map(|projected| span(plan, line, &projected)).collect()
     }
 
     /// The parts of it that any row may see; `None` if there are none. All rays of the frame have directions
@@ -145,9 +238,7 @@ impl Swept {
     /// Where its parts may be seen during the exposure of a row, those that are not behind the camera. Each is
     /// in the box that holds all of the motion within the exposure, however fast it turns.
     fn project(&self, path: &CameraPath, plan: &FramePlan, line: usize) -> Vec<Projected> {
-        let [x, y] = pixel(plan, line, 0);
-        let mid_s = plan.stamp_s + plan.shutter.dt_pixel_s(x, y);
-        let exposure_s = plan.shutter.exposure_pixel_s(x, y);
+        let (mid_s, exposure_s) = exposure_of(plan, line);
         let half_s = 0.5 * exposure_s;
         let swept = self.motion.bounds(&self.bounds, mid_s - half_s, mid_s + half_s);
         let poses = PHASES.map(|phase| {
@@ -165,6 +256,13 @@ impl Swept {
 fn along(bounds: &Aabb, segment: &[DVec3; 2]) -> Aabb {
     let [from, to] = segment;
     Aabb { min: bounds.min + from.min(*to), max: bounds.max + from.max(*to) }
+}
+
+fn box_corners(Aabb { min, max }: &Aabb) -> [DVec3; 8] {
+    std::array::from_fn(|k| {
+        let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
+        DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
+    })
 }
 
 /// Width and height of a box in the picture, pixels; `None` if it is behind the camera or not wholly in view.
@@ -185,15 +283,12 @@ fn project(plan: &FramePlan, poses: &[(f64, CameraPose)], bounds: &Aabb, swept: 
 }
 
 /// The corners of a box from poses at path times; everywhere if some are not in view, `None` if all are behind.
-fn corners(plan: &FramePlan, poses: &[(f64, CameraPose)], Aabb { min, max }: &Aabb) -> Option<Projected> {
+fn corners(plan: &FramePlan, poses: &[(f64, CameraPose)], bounds: &Aabb) -> Option<Projected> {
     let everywhere = Projected { low_px: DVec2::NEG_INFINITY, high_px: DVec2::INFINITY };
     let (mut low_px, mut high_px) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let (mut shown, mut in_front, mut all) = (0, 0, 0);
     for (t_s, pose) in poses {
-        for k in 0..8 {
-            let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
-            let corner_ned_m =
-                DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
+        for corner_ned_m in box_corners(bounds) {
             all += 1;
             let depth_m = (pose.ned_from_camera.conjugate() * (corner_ned_m - pose.position_ned_m)).z;
             in_front += u32::from(depth_m > 0.0);

@@ -1,36 +1,24 @@
 //! What moving things and their shadows sweep within the window of a frame.
 
-use std::sync::Arc;
-
-use camsim_core::scene::{Aabb, RigidMotion, Scene};
+use camsim_core::scene::{Aabb, Scene};
 use glam::DVec3;
 
-use super::outline::Swept;
+use super::{outline::Swept, thing::Thing};
 
 /// Most segments of the path of a shadow.
 const MOST_PARTS: f64 = 64.0;
 
-/// All that moves in a scene, with the paths of its shadows between two path times.
-pub(super) fn all_that_moves(scene: &Scene, window_s: [f64; 2]) -> Vec<Swept> {
-    let with_shadow = |(motion, bounds): (Arc<RigidMotion>, Aabb)| {
-        let mut segments_ned_m = vec![[DVec3::ZERO; 2]];
-        segments_ned_m.extend(shadow_segments(scene, &motion.bounds(&bounds, window_s[0], window_s[1])));
-        Swept::new(motion, bounds, segments_ned_m, 0.0)
+/// All that moves, part by part, with the paths of the shadows between two path times.
+pub(super) fn all_that_moves(scene: &Scene, things: &[Thing], window_s: [f64; 2]) -> Vec<Swept> {
+    let swept_of = |thing: &Thing| {
+        let Thing { motion, bounds, parts } = thing;
+        let swept = |bounds: &Aabb, segments_ned_m| Swept::new(motion.clone(), *bounds, segments_ned_m, 0.0);
+        let shadow = shadow_segments(scene, &motion.bounds(bounds, window_s[0], window_s[1]));
+        let shadow = (!shadow.is_empty()).then(|| swept(bounds, shadow));
+        let parts = parts.iter().map(|part| swept(part, vec![[DVec3::ZERO; 2]]));
+        parts.chain(shadow).map(|swept| swept.shaken_as(bounds)).collect::<Vec<_>>()
     };
-    motions(scene).into_iter().map(with_shadow).collect()
-}
-
-/// The motions of a scene, each with all that it carries.
-fn motions(scene: &Scene) -> Vec<(Arc<RigidMotion>, Aabb)> {
-    let mut motions: Vec<(Arc<RigidMotion>, Aabb)> = Vec::new();
-    for mesh in &scene.meshes {
-        let Some(motion) = &mesh.motion else { continue };
-        match motions.iter_mut().find(|(known, _)| Arc::ptr_eq(known, motion)) {
-            Some((_, bounds)) => *bounds = bounds.union(&mesh.bounds()),
-            None => motions.push((motion.clone(), mesh.bounds())),
-        }
-    }
-    motions
+    things.iter().flat_map(swept_of).collect()
 }
 
 /// Segments of the path of a box along the sun's rays on which it may meet something that stands still and has
