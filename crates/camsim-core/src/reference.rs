@@ -18,6 +18,7 @@ use crate::{
     lens::{DEFAULT_REACH, Lens, ModelFacts},
     pose::CameraPose,
     scenario::{CameraSpec, Primary},
+    scene::Scene,
     sequence::Sequence,
     shutter::{Shutter, ShutterError},
 };
@@ -83,6 +84,14 @@ pub struct ReferenceRenderer {
     /// `None` for a zoom lens.
     fixed: Option<LensInverse>,
     zoomed: Mutex<Vec<(u64, Arc<LensInverse>)>>,
+    scene: Arc<PreparedScene>,
+    optics: Option<Optics>,
+    sensor: Option<ImageSensor>,
+}
+
+/// What is prepared of a scene for rays.
+#[derive(Debug)]
+struct PreparedScene {
     terrain_pyramid: Option<TerrainPyramid>,
     /// What stands still.
     mesh_bvh: MeshBvh,
@@ -92,8 +101,19 @@ pub struct ReferenceRenderer {
     blends: bool,
     /// Numbers of the meshes that emit light above white.
     lamps: Vec<usize>,
-    optics: Option<Optics>,
-    sensor: Option<ImageSensor>,
+}
+
+impl PreparedScene {
+    fn new(scene: &Scene) -> Self {
+        Self {
+            terrain_pyramid: scene.terrain.as_ref().map(TerrainPyramid::new),
+            mesh_bvh: MeshBvh::new(&scene.meshes, scene.light, |mesh| mesh.motion.is_none()),
+            moving: moving_meshes(&scene.meshes, scene.light),
+            shading: Shading::new(scene),
+            blends: scene.has_blended(),
+            lamps: scene.lamps().collect(),
+        }
+    }
 }
 
 /// What one image position sees at one instant.
@@ -151,6 +171,14 @@ impl ReferenceRenderer {
     /// # Errors
     /// A camera or shutter that cannot be used.
     pub fn new(sequence: Arc<Sequence>) -> Result<Self, ReferenceError> {
+        Self::renewed(None, sequence)
+    }
+
+    /// As [`Self::new`]; what `before` has prepared of the scene is kept if it is the same [`Arc`].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn renewed(before: Option<&Self>, sequence: Arc<Sequence>) -> Result<Self, ReferenceError> {
         let camera = &sequence.scenario.camera;
         // Called for its checks only; the values are not used.
         CameraModel::from_spec(camera)?;
@@ -161,22 +189,22 @@ impl ReferenceRenderer {
         }
         let fixed = if camera.zoom.is_empty() { Some(lenses(camera, None)?) } else { None };
         let sensor = ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed);
-        Ok(Self { fixed, sensor, ..Self::of_scene(sequence) })
+        let known = before.filter(|before| Arc::ptr_eq(&before.sequence.scene, &sequence.scene));
+        let scene = known.map(|known| known.scene.clone());
+        Ok(Self { fixed, sensor, ..Self::of_prepared(scene, sequence) })
     }
 
     /// Rays through the scene of a sequence, without its camera.
     pub(crate) fn of_scene(sequence: Arc<Sequence>) -> Self {
-        let scene = &sequence.scene;
+        Self::of_prepared(None, sequence)
+    }
+
+    fn of_prepared(scene: Option<Arc<PreparedScene>>, sequence: Arc<Sequence>) -> Self {
         Self {
             timing: FrameTiming::new(&sequence),
             fixed: None,
             zoomed: Mutex::default(),
-            terrain_pyramid: scene.terrain.as_ref().map(TerrainPyramid::new),
-            mesh_bvh: MeshBvh::new(&scene.meshes, scene.light, |mesh| mesh.motion.is_none()),
-            moving: moving_meshes(&scene.meshes, scene.light),
-            shading: Shading::new(scene),
-            blends: scene.has_blended(),
-            lamps: scene.lamps().collect(),
+            scene: scene.unwrap_or_else(|| Arc::new(PreparedScene::new(&sequence.scene))),
             optics: Optics::new(&sequence.scenario.camera, sequence.scenario.seed),
             sensor: ImageSensor::new(&sequence.scenario.camera, sequence.scenario.seed),
             sequence,
@@ -243,19 +271,19 @@ impl ReferenceRenderer {
         let ray = Ray::new(origin_ned_m, direction_ned)?;
         let terrain_hit = self.cast_terrain(&ray);
         let limit = limit_of(terrain_hit);
-        let still = self.mesh_bvh.first(&ray, limit).or(terrain_hit);
+        let still = self.scene.mesh_bvh.first(&ray, limit).or(terrain_hit);
         self.nearer_moving(&ray, t_s, still, false)
     }
 
     /// `hit`, or what moves in front of it; opaque surfaces only if `solid`.
     fn nearer_moving(&self, ray: &Ray, t_s: f64, hit: Option<Hit>, solid: bool) -> Option<Hit> {
-        self.moving.iter().fold(hit, |hit, meshes| meshes.first(ray, t_s, limit_of(hit), solid).or(hit))
+        self.scene.moving.iter().fold(hit, |hit, meshes| meshes.first(ray, t_s, limit_of(hit), solid).or(hit))
     }
 
     fn cast_terrain(&self, ray: &Ray) -> Option<Hit> {
         let terrain = self.sequence.scene.terrain.as_ref();
         terrain
-            .zip(self.terrain_pyramid.as_ref())
+            .zip(self.scene.terrain_pyramid.as_ref())
             .and_then(|(terrain, terrain_pyramid)| terrain_pyramid.first(terrain, ray, f64::INFINITY))
     }
 
@@ -263,7 +291,7 @@ impl ReferenceRenderer {
     /// is all the light of the ray; [`ReferenceRenderer::radiance`] includes both.
     #[must_use]
     pub fn color(&self, uv: DVec2, hit: Option<&Hit>) -> DVec3 {
-        self.shading.color(hit, uv.extend(1.0).length())
+        self.scene.shading.color(hit, uv.extend(1.0).length())
     }
 
     /// As [`ReferenceRenderer::radiance_at`] at path time 0, for scenes in which nothing moves.

@@ -49,12 +49,28 @@ impl CameraReference {
     /// # Errors
     /// A camera or shutter that cannot be used.
     pub fn new(sequence: Arc<Sequence>, channels: &[Channel]) -> Result<Self, ReferenceError> {
+        Self::renewed(None, sequence, channels)
+    }
+
+    /// As [`Self::new`]; what `before` has prepared of the scene is kept if it is the same [`Arc`].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn renewed(
+        before: Option<&Self>,
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+    ) -> Result<Self, ReferenceError> {
         let faces = faces(&sequence, channels)?;
-        let parts = match faces.as_slice() {
+        let sequences = match faces.as_slice() {
             [] => vec![sequence.clone()],
             faces => faces.iter().flat_map(|face| colors(sequence.face(*face))).collect(),
         };
-        let parts: Vec<_> = parts.into_iter().map(ReferenceRenderer::new).collect::<Result<_, _>>()?;
+        let mut parts: Vec<ReferenceRenderer> = Vec::new();
+        for sequence in sequences {
+            let known = parts.first().or(before.and_then(|before| before.parts.first()));
+            parts.push(ReferenceRenderer::renewed(known, sequence)?);
+        }
         let stages = WholeFrame::new(&sequence);
         let stages = if parts.len() > 1 { stages } else { stages.without_weights() };
         Ok(Self { sequence, parts, stages })
@@ -70,6 +86,12 @@ impl CameraReference {
     #[must_use]
     pub fn parts(&self) -> &[ReferenceRenderer] {
         &self.parts
+    }
+
+    /// Whether frames are made of the faces of a cube.
+    #[must_use]
+    pub fn has_faces(&self) -> bool {
+        self.parts[0].sequence().scenario.camera.face.is_some()
     }
 
     /// The frame that all parts have made, with the stages that take whole frames.

@@ -177,9 +177,9 @@ impl<'a> Session<'a> {
         self.cpu.set_leaves_truth(!looked_up);
     }
 
-    /// Frames are cancelled while this is `true`: [`Session::render`] ends with [`RenderError::Cancelled`] before
-    /// its next stage (plan, ideal frame, output frame), or within the rays of things that move. The session
-    /// remains usable.
+    /// Frames are cancelled while this is `true`: [`Session::render`] ends with [`RenderError::Cancelled`] before it
+    /// draws a frame or makes its output on the cpu, or within the rays of things that move. A plan or a pass in
+    /// progress is finished first. The session remains usable.
     pub fn set_cancel(&mut self, cancel: Arc<AtomicBool>) {
         self.cancel = Cancel(Some(cancel));
     }
@@ -382,7 +382,6 @@ impl<'a> Session<'a> {
         }
         let begin = Instant::now();
         let frame = self.with_truth(job.lane, &plan, color_rgba, truth)?;
-        self.check_cancel()?;
         times.read_ms += ms_since(begin);
         let mut out_of_order = 0;
         if let (Some(gpu), FrameLocation::Gpu(submitted) | FrameLocation::Copied(submitted, _)) =
@@ -391,6 +390,7 @@ impl<'a> Session<'a> {
             times.passes = gpu.pass_times(submitted)?;
             out_of_order = submitted.out_of_order;
         }
+        self.check_cancel()?;
         Ok(Finished { frame, plan, faces: Vec::new(), lod, out_of_order, times })
     }
 
@@ -413,7 +413,7 @@ impl<'a> Session<'a> {
             lamps.paint(&mut color_rgba, plan, &self.cancel);
         }
         let mut planes = Vec::new();
-        if let Some(truth) = &mut truth {
+        if let Some(truth) = truth.as_mut().filter(|_| !self.cancel.is_set()) {
             let is_looked_up = |truth: &Truth| self.looks_up_coords && truth.depth_m >= 0.0;
             let looked_up: Vec<Option<[f32; 2]>> =
                 truth.iter().map(|truth| is_looked_up(truth).then_some(truth.source_px)).collect();

@@ -11,7 +11,7 @@ use eframe::egui;
 
 use crate::{
     display_image,
-    engine::{EngineHandle, FrameRequest, Picture, ReferenceRequest},
+    engine::{EngineHandle, FrameRequest, Picture, ReferenceRequest, Size},
     export::Exporter,
     fonts,
     frame_rate::FrameRateMonitor,
@@ -139,9 +139,10 @@ impl Viewer {
         if let Some(request) = &request
             && self.last_request.as_ref() != Some(request)
         {
-            // Play shows full frames as they come.
+            // Play may show full frames as they come.
+            let is_shown_late = self.state.timeline.playing && request.size == Size::Full;
             let is_other = self.last_request.as_ref().is_some_and(|last| !last.is_same_frame(request));
-            self.engine.request_frame(request.clone(), is_other && !self.state.timeline.playing);
+            self.engine.request_frame(request.clone(), is_other && !is_shown_late);
         }
         self.last_request = request;
         let Some(request) = self.state.reference_request() else { return };

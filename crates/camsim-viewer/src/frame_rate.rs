@@ -1,5 +1,5 @@
-//! Frame rate of the window, for measurements: `CAMSIM_VIEWER_PULSE=1` draws it all the time and prints the rate to
-//! standard error; `CAMSIM_VIEWER_PULSE=0` prints how long each picture took to settle.
+//! Frame rate of the window, for measurements: `CAMSIM_VIEWER_PULSE=1` draws the window all the time and prints its
+//! rate to standard error; `CAMSIM_VIEWER_PULSE=0` prints how long each picture took to settle.
 
 use std::time::{Duration, Instant};
 

@@ -91,8 +91,8 @@ pub struct State {
     now_s: f64,
     /// egui's time of the last input, seconds.
     last_input_s: f64,
-    /// egui's time since when the wanted picture has not been shown, seconds.
-    pending_since_s: Option<f64>,
+    /// The frame that is wanted and not shown, and egui's time since when, seconds.
+    pending_since: Option<(u64, f64)>,
     /// Time for which the last wanted picture was missing, seconds.
     pub settled_in_s: Option<f64>,
 }
@@ -123,11 +123,15 @@ impl State {
 
     /// Notes whether the wanted picture is shown; play wants another one all the time.
     pub fn note_pending(&mut self) {
-        let is_pending = self.is_pending() && !(self.timeline.playing && self.engine.fault.is_none());
-        if !is_pending && let Some(since_s) = self.pending_since_s {
-            self.settled_in_s = Some(self.now_s - since_s);
-        }
-        self.pending_since_s = is_pending.then_some(self.pending_since_s.unwrap_or(self.now_s));
+        let pending = self.pending().filter(|_| !self.timeline.playing);
+        self.pending_since = match (pending, self.pending_since) {
+            (None, Some((_, since_s))) => {
+                self.settled_in_s = Some(self.now_s - since_s);
+                None
+            }
+            (Some(frame), Some((before, since_s))) if frame == before => Some((frame, since_s)),
+            (pending, _) => pending.map(|frame| (frame, self.now_s)),
+        };
     }
 
     /// Records an input at the present time.
@@ -175,28 +179,32 @@ impl State {
                     (true, true) => reply.request.size == Size::Preview && *shown == wanted,
                     (true, false) => false,
                     (false, true) => true,
-                    // Play shows full frames as they come; else a full frame that is not wanted any more took so
-                    // long that previews of later ones are shown.
-                    (false, false) => reply.request.size == Size::Full && !self.timeline.playing,
+                    // Play may show full frames as they come; else a full frame that is not wanted any more took
+                    // so long that previews of later ones are shown.
+                    (false, false) => {
+                        reply.request.size == Size::Full
+                            && !(self.timeline.playing && wanted.size == Size::Full)
+                    }
                 }
             }
             _ => false,
         }
     }
 
-    /// Whether the shown picture is not the wanted one: of another frame or scenario, or a preview.
-    pub fn is_pending(&self) -> bool {
+    /// The frame that is wanted and not shown: another one or another scenario is, or a preview of it.
+    pub fn pending(&self) -> Option<u64> {
+        let wanted = self.frame_request().filter(|_| self.engine.fault.is_none())?;
         let shown = self.engine.shown.as_ref().map(|shown| &shown.reply.request);
-        match (self.frame_request(), shown) {
-            (Some(wanted), Some(shown)) => !shown.is_same_frame(&wanted) || shown.size != wanted.size,
-            (wanted, _) => wanted.is_some(),
-        }
+        let is_shown = shown.is_some_and(|shown| {
+            shown.is_same_frame(&wanted) && (shown.size == Size::Full || wanted.size == Size::Preview)
+        });
+        (!is_shown).then_some(wanted.frame)
     }
 
     /// Seconds for which the wanted picture has been missing; `None` if it is shown, or has not been missing long
     /// enough to say so.
     pub fn pending_s(&self) -> Option<f64> {
-        let since_s = self.pending_since_s?;
+        let (_, since_s) = self.pending_since?;
         Some(self.now_s - since_s).filter(|pending_s| *pending_s >= MARK_AFTER_S)
     }
 
@@ -252,7 +260,7 @@ impl State {
     /// Seconds until input counts as idle or a missing picture is marked, whichever comes first; `None` if neither
     /// is to come.
     pub fn wake_in_s(&self) -> Option<f64> {
-        let mark_s = self.pending_since_s.map(|since_s| since_s + MARK_AFTER_S - self.now_s);
+        let mark_s = self.pending_since.map(|(_, since_s)| since_s + MARK_AFTER_S - self.now_s);
         [self.idle_in_s(), mark_s].into_iter().flatten().filter(|in_s| *in_s > 0.0).reduce(f64::min)
     }
 

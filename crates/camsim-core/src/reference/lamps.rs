@@ -38,7 +38,7 @@ pub(super) struct RowLamps<'a> {
 impl<'a> RowLamps<'a> {
     pub(super) fn new(view: &'a FrameView<'a>, y: u32, width: u32) -> Self {
         let reference = view.reference;
-        let lamps = reference.lamps.iter().map(|&mesh| &reference.sequence.scene.meshes[mesh]);
+        let lamps = reference.scene.lamps.iter().map(|&mesh| &reference.sequence.scene.meshes[mesh]);
         let ends = [[0, y], [width.saturating_sub(1), y]];
         let [first, last] = ends.map(|pixel| [view.mid_s(pixel), 0.5 * view.exposure_s(pixel)]);
         let begin_s = (first[0] - first[1]).min(last[0] - last[1]);

@@ -28,9 +28,9 @@ impl ReferenceRenderer {
         let Some(ray) = Ray::new(hit.point_ned_m + LIFT_M * hit.normal_ned, light.to_sun_ned) else {
             return false;
         };
-        let ground = scene.terrain.as_ref().zip(self.terrain_pyramid.as_ref());
+        let ground = scene.terrain.as_ref().zip(self.scene.terrain_pyramid.as_ref());
         ground.is_some_and(|(terrain, terrain_pyramid)| terrain_pyramid.blocks(terrain, &ray))
-            || self.mesh_bvh.blocks(&ray)
-            || self.moving.iter().any(|meshes| meshes.blocks(&ray, t_s))
+            || self.scene.mesh_bvh.blocks(&ray)
+            || self.scene.moving.iter().any(|meshes| meshes.blocks(&ray, t_s))
     }
 }

@@ -137,7 +137,7 @@ impl Lamps {
         }
         let motion = mesh.motion.clone().unwrap_or_else(|| Arc::new(RigidMotion::new(Vec::new())));
         let swept = Swept::new(motion, mesh.bounds(), vec![[DVec3::ZERO; 2]], room_px(plan) + ROOM_PX);
-        let swept = swept.in_view(path, plan)?.within_lines(path, plan, 0.0);
+        let swept = swept.in_view(path, plan)?.within_lines(path, plan);
         let wanted = (RAYS_OF_LAMP / (width_px * height_px)).clamp(f64::from(RAYS), f64::from(MOST_RAYS));
         let rays = (wanted as u32).next_power_of_two();
         Some(Small { mesh, swept, rays })

@@ -17,11 +17,10 @@ use super::line_count;
 
 /// Exposure phases of the cameras that boxes are projected by.
 const PHASES: [f64; 3] = [-0.5, 0.0, 0.5];
-/// Instants within an exposure, per second, at which cameras that shake are looked at, and most of them.
-const SHAKES_HZ: f64 = 2000.0;
-/// How far a camera may shake between [`INSTANTS`], as a fraction of the rows.
-const SHAKE: f64 = 0.1;
-const MOST_STEPS: f64 = 64.0;
+/// Instants at which a camera that shakes is looked at within an exposure: for each of its fastest vibrations, and at
+/// least.
+const STEPS_A_SHAKE: f64 = 8.0;
+const LEAST_STEPS: f64 = 8.0;
 /// Room around the projected corners of a box, pixels, and as a fraction of its size: edges that a lens bends.
 const ROOM_PX: f64 = 2.0;
 const ROOM: f64 = 0.1;
@@ -54,8 +53,10 @@ pub(super) fn pixel(plan: &FramePlan, line: usize, along: u32) -> [u32; 2] {
 impl Outline {
     pub fn new(path: &CameraPath, plan: &FramePlan, swept: &[Swept]) -> Self {
         let in_view = swept.iter().filter_map(|swept| swept.in_view(path, plan));
-        let shake_px = SHAKE * line_count(plan) as f64;
-        let swept: Vec<Swept> = in_view.map(|swept| swept.within_lines(path, plan, shake_px)).collect();
+        // Between the instants at which rows are ruled out, a camera may shake.
+        let is_steady = path.highest_vibration_hz() == 0.0;
+        let swept: Vec<Swept> =
+            in_view.map(|swept| if is_steady { swept.within_lines(path, plan) } else { swept }).collect();
         let spans = (0..line_count(plan)).into_par_iter().map(|line| {
             let mut shaken = Shaken::default();
             let here = swept.iter().filter(|swept| swept.may_be_in(plan, line));
@@ -74,50 +75,62 @@ impl Outline {
 /// How far the camera shakes within the exposure of a row beyond what the cameras at [`PHASES`] show, for each
 /// thing.
 #[derive(Default)]
-struct Shaken {
-    known: Vec<(Aabb, f64)>,
+struct Shaken<'a> {
+    known: Vec<(&'a Swept, f64)>,
 }
 
-impl Shaken {
-    fn room_px(&mut self, swept: &Swept, path: &CameraPath, plan: &FramePlan, line: usize) -> f64 {
-        let Some(whole) = swept.shaken_as else { return 0.0 };
-        if let Some((_, room_px)) = self.known.iter().find(|(known, _)| *known == whole) {
+impl<'a> Shaken<'a> {
+    fn room_px(&mut self, swept: &'a Swept, path: &CameraPath, plan: &FramePlan, line: usize) -> f64 {
+        let is_same =
+            |known: &Swept| known.shaken_as == swept.shaken_as && Arc::ptr_eq(&known.motion, &swept.motion);
+        if let Some((_, room_px)) = self.known.iter().find(|(known, _)| is_same(known)) {
             return *room_px;
         }
-        let room_px = shake_px(path, plan, line, &swept.motion, &whole);
-        self.known.push((whole, room_px));
+        let whole = swept.shaken_as.and_then(|whole| shake_px(path, plan, line, (&swept.motion, &whole)));
+        let Some(room_px) = whole else {
+            // Not all of it is in view: that of the part alone, if it is.
+            return shake_px(path, plan, line, (&swept.motion, &swept.bounds)).unwrap_or_default();
+        };
+        self.known.push((swept, room_px));
         room_px
     }
 }
 
-/// How far corners of a box are seen, at instants close to each other within the exposure of a row, from the
-/// box around them at [`PHASES`]; pixels.
-fn shake_px(path: &CameraPath, plan: &FramePlan, line: usize, motion: &RigidMotion, bounds: &Aabb) -> f64 {
+/// How far corners of a moving box are seen, at instants close to each other within the exposure of a row, from the
+/// box around them at [`PHASES`]; pixels. `None` if a corner is out of view.
+fn shake_px(
+    path: &CameraPath,
+    plan: &FramePlan,
+    line: usize,
+    (motion, bounds): (&RigidMotion, &Aabb),
+) -> Option<f64> {
     let (mid_s, exposure_s) = exposure_of(plan, line);
-    let steps = (exposure_s * SHAKES_HZ).ceil().min(MOST_STEPS);
-    if exposure_s <= 0.0 {
-        return 0.0;
+    let steps = (STEPS_A_SHAKE * path.highest_vibration_hz() * exposure_s).ceil();
+    if steps <= 0.0 {
+        return Some(0.0);
     }
     // Where it is at mid-exposure: how it moves itself is in its bounds.
     let corners = box_corners(&motion.bounds(bounds, mid_s, mid_s));
     let seen_at = |phase: f64| {
         let t_s = mid_s + phase * exposure_s;
         let pose = path.pose(t_s);
-        corners.map(|corner| plan.camera.show(&pose, t_s, WorldPoint::At(corner)).map(|(px, _)| px))
+        let show = |corner| plan.camera.show(&pose, t_s, WorldPoint::At(corner)).map(|(px, _)| px);
+        corners.map(show).into_iter().collect::<Option<Vec<DVec2>>>()
     };
     let mut hulls = [(DVec2::INFINITY, DVec2::NEG_INFINITY); 8];
-    for seen in PHASES.map(seen_at) {
-        for ((low, high), px) in hulls.iter_mut().zip(seen) {
-            (*low, *high) = (low.min(px.unwrap_or(*low)), high.max(px.unwrap_or(*high)));
+    for phase in PHASES {
+        for ((low, high), px) in hulls.iter_mut().zip(seen_at(phase)?) {
+            (*low, *high) = (low.min(px), high.max(px));
         }
     }
-    let away_px = |step: u32| {
-        let seen = seen_at(f64::from(step) / steps - 0.5);
-        let known = hulls.iter().zip(seen).filter(|((low, _), _)| low.is_finite());
-        let away = known.filter_map(|((low, high), px)| Some((*low - px?).max(px? - *high).max_element()));
-        away.fold(0.0, f64::max)
-    };
-    (0..=steps as u32).map(away_px).fold(0.0, f64::max)
+    let steps = steps.max(LEAST_STEPS);
+    let mut room_px = 0.0_f64;
+    for step in 0..=steps as u32 {
+        for ((low, high), px) in hulls.iter().zip(seen_at(f64::from(step) / steps - 0.5)?) {
+            room_px = room_px.max((*low - px).max(px - *high).max_element());
+        }
+    }
+    Some(room_px)
 }
 
 /// Mid-exposure of a row, path time, and its exposure, seconds.
@@ -161,8 +174,7 @@ impl Swept {
     }
 
     /// With the rows of the readout that it can be in, which spares the others a look.
-    /// `room_px` is for how the camera shakes between the instants at which it is looked at.
-    pub fn within_lines(self, path: &CameraPath, plan: &FramePlan, room_px: f64) -> Self {
+    pub fn within_lines(self, path: &CameraPath, plan: &FramePlan) -> Self {
         let [begin_s, end_s] = plan.window_s;
         let swept = self.motion.bounds(&self.bounds, begin_s, end_s);
         let poses: Vec<(f64, CameraPose)> = (0..=INSTANTS)
@@ -178,7 +190,6 @@ impl Swept {
             .iter()
             .filter_map(|segment| project(plan, &poses, &along(&swept, segment), &self));
         let across_px = all.map(ends).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
-        let across_px = across_px.map(|[first, last]| [first - room_px, last + room_px]);
         Self { across_px: across_px.unwrap_or(self.across_px), ..self }
     }
 

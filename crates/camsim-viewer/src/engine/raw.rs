@@ -3,7 +3,7 @@
 use camsim_core::{
     frame::RawPicture,
     imaging::{SensorLevels, color_at, sensor_levels, with_facts},
-    scenario::{CameraSpec, Mosaic},
+    scenario::{CameraSpec, Companding, Mosaic},
     scene::srgb_from_linear_f64,
 };
 use eframe::egui::{Color32, ColorImage};
@@ -31,16 +31,18 @@ pub struct Histogram {
 pub struct RawScale {
     mosaic: Mosaic,
     levels: SensorLevels,
-    /// Whether numbers are proportional to electrons, and not companded.
-    is_linear: bool,
+    /// Numbers of the converter in one of the raw picture; `None` if these are companded.
+    step_dn: Option<f64>,
 }
 
 impl RawScale {
     /// `None` for a camera without sensor.
     pub fn new(camera: &CameraSpec) -> Option<Self> {
         let levels = sensor_levels(camera)?;
-        let mosaic = with_facts(camera.sensor.as_ref()?).mosaic;
-        Some(Self { mosaic, levels, is_linear: levels.adc_bits == levels.bits })
+        let sensor = with_facts(camera.sensor.as_ref()?);
+        let step_dn = f64::from(1_u32 << levels.adc_bits.saturating_sub(levels.bits));
+        let step_dn = (sensor.companding == Companding::None).then_some(step_dn);
+        Some(Self { mosaic: sensor.mosaic, levels, step_dn })
     }
 
     /// Colours of the numbers of a pixel: 0, 1, 2 are red, green, blue, 3 is white.
@@ -51,17 +53,29 @@ impl RawScale {
         }
     }
 
-    /// Electrons that a number stands for, before noise of the readout is known; `None` for companded numbers.
+    /// As of a frame whose signal is amplified by this gain beside the sensor's own.
+    pub fn amplified(self, gain: f64) -> Self {
+        let gain_e_per_dn = self.levels.gain_e_per_dn / gain;
+        Self { levels: SensorLevels { gain_e_per_dn, ..self.levels }, ..self }
+    }
+
+    /// Whether all pixels measure the same, luminance.
+    pub fn is_mono(&self) -> bool {
+        self.mosaic == Mosaic::Mono
+    }
+
+    /// Electrons that a number stands for, readout noise included; `None` for companded numbers.
     pub fn electrons(&self, code: u16) -> Option<f64> {
-        self.is_linear.then(|| (f64::from(code) - self.levels.black_dn) * self.levels.gain_e_per_dn)
+        let SensorLevels { black_dn, gain_e_per_dn, .. } = self.levels;
+        self.step_dn.map(|step_dn| (f64::from(code) * step_dn - black_dn) * gain_e_per_dn)
     }
 
     /// Brightness of a number on the screen, 0 to 1 from black to the end of the range.
     fn brightness(&self, code: u16) -> f64 {
         let end = f64::from((1_u32 << self.levels.bits) - 1);
-        let black = if self.is_linear { self.levels.black_dn } else { 0.0 };
-        let linear = ((f64::from(code) - black) / (end - black)).clamp(0.0, 1.0);
-        if self.is_linear { srgb_from_linear_f64(linear) } else { linear }
+        let black = self.step_dn.map_or(0.0, |step_dn| self.levels.black_dn / step_dn);
+        let fraction = ((f64::from(code) - black) / (end - black)).clamp(0.0, 1.0);
+        if self.step_dn.is_some() { srgb_from_linear_f64(fraction) } else { fraction }
     }
 }
 
@@ -156,7 +170,7 @@ mod tests {
             adc_bits: 10,
             bits: 10,
         };
-        RawScale { mosaic, levels, is_linear: true }
+        RawScale { mosaic, levels, step_dn: Some(1.0) }
     }
 
     #[test]
@@ -176,8 +190,11 @@ mod tests {
     fn electrons_are_above_black() {
         assert_eq!(scale(Mosaic::Mono).electrons(64), Some(0.0));
         assert_eq!(scale(Mosaic::Mono).electrons(164), Some(200.0));
-        let companded = RawScale { is_linear: false, ..scale(Mosaic::Mono) };
+        let companded = RawScale { step_dn: None, ..scale(Mosaic::Mono) };
         assert_eq!(companded.electrons(164), None);
+        let of_eight_bits = RawScale { step_dn: Some(4.0), ..scale(Mosaic::Mono) };
+        assert_eq!(of_eight_bits.electrons(41), Some(200.0));
+        assert_eq!(of_eight_bits.amplified(2.0).electrons(41), Some(100.0));
         assert_eq!(scale(Mosaic::Mono).brightness(10), 0.0);
         assert!((scale(Mosaic::Mono).brightness(1023) - 1.0).abs() < 1e-12);
     }

@@ -49,20 +49,21 @@ pub fn run(mailbox: &Mailbox<ReferenceRequest>, replies: &ReplySender) {
     let mut cached: Option<Arc<CameraReference>> = None;
     let mut partial: Option<PartialFrame> = None;
     while let Some(request) = mailbox.take() {
-        let reference =
-            match cached.take().filter(|reference| Arc::ptr_eq(reference.sequence(), &request.sequence)) {
-                Some(reference) => reference,
-                None => match CameraReference::new(request.sequence.clone(), &[Channel::Color]) {
-                    Ok(reference) => {
-                        partial = None;
-                        Arc::new(reference)
-                    }
-                    Err(error) => {
-                        replies.send(Reply::Failed(error.to_string()));
-                        continue;
-                    }
-                },
-            };
+        let before = cached.as_deref();
+        let known = cached.as_ref().filter(|known| Arc::ptr_eq(known.sequence(), &request.sequence));
+        let reference = match known {
+            Some(known) => known.clone(),
+            None => match CameraReference::renewed(before, request.sequence.clone(), &[Channel::Color]) {
+                Ok(reference) => {
+                    partial = None;
+                    Arc::new(reference)
+                }
+                Err(error) => {
+                    replies.send(Reply::Failed(error.to_string()));
+                    continue;
+                }
+            },
+        };
         cached = Some(reference.clone());
         replies.send(Reply::Reference(reference.clone()));
         let Some(frame) = request.frame else { continue };

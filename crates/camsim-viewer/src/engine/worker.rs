@@ -94,6 +94,7 @@ fn run_on(
                 .unwrap_or(Err(Fault::Stopped));
             // A newer request waits, or the preview of one is being rendered.
             if matches!(served, Err(Fault::Render(RenderError::Cancelled))) {
+                lost_request = None;
                 continue;
             }
             let Err(fault) = served else {
@@ -231,8 +232,9 @@ impl<'a> Worker<'a> {
         let began = Instant::now();
         let rendered = variant(sequence, stage, size)?;
         let finished = self.render(&rendered, &[Channel::Color], frame)?;
-        let raw_scale = RawScale::new(&rendered.scenario.camera);
         let Finished { frame, plan, faces, times, .. } = finished;
+        let gain = plan.exposure.map_or(1.0, |exposure| exposure.gain);
+        let raw_scale = RawScale::new(&rendered.scenario.camera).map(|scale| scale.amplified(gain));
         let image = Arc::new(srgb_image(frame.size_px, frame.color_rgba()));
         let took_ms = 1e3 * began.elapsed().as_secs_f64();
         let picture = Arc::new(Picture { stage, frame, plan, faces, times, took_ms, raw_scale, image });

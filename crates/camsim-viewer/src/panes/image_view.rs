@@ -123,11 +123,8 @@ fn draw_stage(ui: &Ui, state: &State, viewport: &ImageViewport, stage: Stage, cl
 fn frame(state: &State) -> String {
     let shown = state.engine.shown.as_ref().map_or(0, |shown| shown.reply.frame);
     let wanted = state.timeline.frame;
-    if shown == wanted {
-        format!("frame {shown}")
-    } else {
-        format!("frame {shown} (of {wanted} there is none yet)")
-    }
+    let is_late = shown != wanted && !state.timeline.playing;
+    if is_late { format!("frame {shown} ({wanted} not ready)") } else { format!("frame {shown}") }
 }
 
 /// Marks a picture that is not the wanted one.
@@ -183,7 +180,7 @@ fn difference(ui: &Ui, state: &State, viewport: &ImageViewport) {
     let view = &state.view;
     let painter = ui.painter().with_clip_rect(viewport.pane);
     let corner = viewport.pane.left_top() + egui::vec2(6.0, 4.0);
-    let pair = format!("A: {} - B: {}", view.a.label(), view.b.label());
+    let pair = format!("A: {} - B: {}, {}", view.a.label(), view.b.label(), frame(state));
     if view.a == view.b {
         return label(&painter, corner, &format!("{pair}: the same picture"));
     }
@@ -198,7 +195,10 @@ fn difference(ui: &Ui, state: &State, viewport: &ImageViewport) {
         String::new()
     };
     // The reference's picture is always subtracted.
-    let pair = if view.a == Stage::Reference { format!("{} - reference", view.b.label()) } else { pair };
+    let pair = match view.a {
+        Stage::Reference => format!("{} - reference, {}", view.b.label(), frame(state)),
+        _ => pair,
+    };
     let progress = if view.wants_reference() { rows_done(state) } else { String::new() };
     label(
         &painter,

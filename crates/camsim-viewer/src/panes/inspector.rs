@@ -1,5 +1,7 @@
 //! The pixel under the cursor, or the pinned one: values, row time, ray, surface, predicted errors.
 
+use std::sync::Arc;
+
 use camsim_core::{
     camera::CameraModel,
     geodesy::LocalFrame,
@@ -19,6 +21,7 @@ use super::{
     widgets::{fact, fixed, signed},
 };
 use crate::{
+    engine::Size,
     engine_state::StagePicture,
     message::{Message, Outbox},
     motion,
@@ -49,18 +52,24 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
             values(ui, state, &picture, pixel);
         }
     }
-    let plan = state.engine.picture().map(|picture| picture.plan_at(pixel));
+    // Previews have larger pixels.
+    let factor = preview_factor(state);
+    let plan = state.engine.picture().map(|picture| picture.plan_at(pixel.map(|at| at / factor)));
     geometry(ui, state, pixel, plan);
+}
+
+/// Camera pixels per pixel of the shown pictures, along each side.
+fn preview_factor(state: &State) -> u32 {
+    let Some(shown) = &state.engine.shown else { return 1 };
+    match shown.reply.request.size {
+        Size::Full => 1,
+        Size::Preview => crate::engine::preview_factor(shown.reply.request.scenario.camera.size_px),
+    }
 }
 
 /// Values of a pixel in one picture.
 fn values(ui: &mut Ui, state: &State, picture: &StagePicture<'_>, [x, y]: [u32; 2]) {
-    let full = state
-        .engine
-        .shown
-        .as_ref()
-        .map_or(picture.size_px, |shown| shown.reply.request.scenario.camera.size_px);
-    let factor = if full == picture.size_px { 1 } else { crate::engine::preview_factor(full) };
+    let factor = preview_factor(state);
     let index = 4 * ((y / factor) as usize * picture.size_px[0] as usize + (x / factor) as usize);
     let Some(&[r, g, b, a]) =
         picture.color_rgba.get(index..index + 4).and_then(|pixel| pixel.first_chunk::<4>())
@@ -91,12 +100,13 @@ fn raw_facts(ui: &mut Ui, picture: &StagePicture<'_>, [x, y]: [u32; 2]) {
     let first = channels * (y as usize * picture.size_px[0] as usize + x as usize);
     let Some(numbers) = raw.values.get(first..first + channels) else { return };
     for (color, number) in scale.colors([x, y]).into_iter().zip(numbers) {
-        let color = ["red", "green", "blue", "white"].get(color).copied().unwrap_or_default();
+        let color = [", red", ", green", ", blue", ", white"].get(color).copied().unwrap_or_default();
+        let color = if scale.is_mono() { "" } else { color };
         let electrons = scale.electrons(*number);
         let electrons = electrons.map_or_else(|| ", companded".to_owned(), |e| format!(", {e:.1} electrons"));
         fact(
             ui,
-            &format!("raw, {color}"),
+            &format!("raw{color}"),
             format!("{number} DN{electrons}"),
             "number of the raw picture; electrons are (number - black) times the gain",
         );
@@ -149,18 +159,18 @@ fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {
     let Some(spec) = state.document.as_ref().map(|document| &document.scenario.camera) else {
         return String::new();
     };
-    let has_ray = |spec| {
-        let camera = CameraModel::from_spec(spec);
-        camera.is_ok_and(|camera| camera.ray(DVec2::new(f64::from(x), f64::from(y))).is_some())
+    let has_ray = |camera: Option<Arc<CameraModel>>| {
+        camera.is_some_and(|camera| camera.ray(DVec2::new(f64::from(x), f64::from(y))).is_some())
     };
-    let without_circle = CameraSpec { image_circle: None, ..spec.clone() };
-    match (has_ray(spec), has_ray(&without_circle)) {
-        (true, _) => "the reference has no ray here".into(),
-        (false, true) => "the pixel lies outside the image circle".into(),
-        (false, false) => {
-            "the lens has no ideal ray here: the pixel lies beyond the fold of its distortion".into()
-        }
+    if has_ray(motion::camera_model(spec)) {
+        return "the reference has no ray here".into();
     }
+    let without_circle = CameraSpec { image_circle: None, ..spec.clone() };
+    // The last camera alone is cached: this one is made for pixels outside a circle only.
+    if spec.image_circle.is_some() && has_ray(CameraModel::from_spec(&without_circle).ok().map(Arc::new)) {
+        return "the pixel lies outside the image circle".into();
+    }
+    "the lens has no ideal ray here: the pixel lies beyond the fold of its distortion".into()
 }
 
 /// The ray of a sample in the axes of the whole camera.

@@ -49,7 +49,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     background(&painter, &map, ui.visuals().text_color(), &screen);
-    for thing in static_map::moving(&sequence.scene, stamp_s) {
+    for thing in map.moving(&sequence.scene, stamp_s) {
         let rect = box_from_above(&thing.corners, &screen);
         painter.rect_filled(rect, 0.0, MOVING_COLOR);
         let font = FontId::proportional(11.0);

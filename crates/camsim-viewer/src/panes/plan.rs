@@ -72,7 +72,7 @@ fn times(ui: &mut Ui, picture: &Picture) {
             "scene for this stage, optics, sensor, picture for the screen",
         );
     }
-    let tip = "from the request to the picture; faces overlap, so that their stages may sum to more";
+    let tip = "for this picture; faces overlap, so that their stages may sum to more";
     fact(ui, "in all", format!("{:.1} ms", picture.took_ms), tip);
     for pass in &times.passes {
         fact(ui, pass.name, format!("{:.2} ms", pass.ms), "on the gpu, by time stamps, while waited for");

@@ -85,7 +85,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     }
     let frustum = ViewFrustum::cached(ui, state, &loaded.sequence, &pose, scene.sphere.radius_m);
     let eye = Eye::new(&orbit, scene.sphere, pane);
-    let moving = static_map::moving(&loaded.sequence.scene, stamp_s);
+    let moving = map.moving(&loaded.sequence.scene, stamp_s);
     draw(ui, rect, &eye, &scene, &map, &moving, frustum.as_ref(), pose.position_ned_m);
     legend(ui, &map, frustum.as_ref(), pose.position_ned_m, state.timeline.frame);
     if let Some(clicked) = response.interact_pointer_pos().filter(|_| response.clicked())
@@ -267,7 +267,7 @@ fn legend(ui: &mut Ui, map: &StaticMap, frustum: Option<&ViewFrustum>, camera_ne
             ui,
             "field of view",
             format!("{across} x {down} deg, {corners} between corners"),
-            "between opposite outer borders, or the outermost rays",
+            "between opposite borders of the picture, or the outermost rays if the lens ends before them",
         );
     }
     fact(

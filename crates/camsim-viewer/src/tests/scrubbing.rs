@@ -191,7 +191,7 @@ fn a_late_full_frame_does_not_replace_the_preview_of_the_wanted_one() {
     window.state_mut().receive(crate::engine::Reply::Frame(Box::new(late.clone())), &context);
     assert_eq!(window.state().engine.shown.as_ref().map(|shown| shown.reply.frame), Some(50));
     window.settle();
-    assert!(!window.state().is_pending());
+    assert_eq!(window.state().pending(), None);
 }
 
 #[test]
@@ -207,7 +207,7 @@ fn a_picture_that_is_not_the_wanted_one_says_so() {
     let mark = "rendering frame 30";
     let is_marked = |window: &Window| window.harness.query_all_by_label_contains(mark).next().is_some();
     let mut marked = false;
-    while !marked && window.state().is_pending() {
+    while !marked && window.state().pending().is_some() {
         window.step();
         marked = is_marked(&window);
     }

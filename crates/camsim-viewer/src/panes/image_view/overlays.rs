@@ -43,14 +43,11 @@ pub fn draw(painter: &Painter, viewport: &ImageViewport, state: &State, picture:
     if overlays.grid
         && let Ok(camera) = stage_camera(state, picture.stage)
     {
-        let is_wide =
-            picture.rendered.or(state.engine.picture()).is_some_and(|picture| !picture.faces.is_empty());
-        grid(
-            painter,
-            viewport,
-            &camera,
-            if is_wide && picture.stage >= Stage::Lens { &Face::ALL } else { &[] },
-        );
+        let is_wide = match picture.rendered {
+            Some(rendered) => !rendered.faces.is_empty(),
+            None => state.engine.current_reference().is_some_and(|reference| reference.has_faces()),
+        };
+        grid(painter, viewport, &camera, if is_wide { &Face::ALL } else { &[] });
     }
     if overlays.motion && picture.stage >= Stage::Time {
         motion_paths(painter, viewport, state);
@@ -253,7 +250,8 @@ fn draw_histogram(painter: &Painter, histogram: &Histogram) {
     let visible = painter.clip_rect();
     let size = vec2(BARS as f32, HISTOGRAM_HEIGHT);
     let kind = if histogram.is_raw { "raw, DN" } else { "sRGB codes" };
-    let caption = format!("0 to {} ({kind}), {:.2} % at the end", histogram.end - 1, 100.0 * histogram.full);
+    let caption =
+        format!("0 to {} ({kind}), {:.2} % at the largest", histogram.end - 1, 100.0 * histogram.full);
     let galley = painter.layout_no_wrap(caption, FontId::proportional(12.0), Color32::WHITE);
     let box_size = vec2(size.x.max(galley.size().x) + 12.0, size.y + galley.size().y + 14.0);
     let frame = Rect::from_min_size(visible.right_bottom() - box_size - vec2(6.0, 6.0), box_size);

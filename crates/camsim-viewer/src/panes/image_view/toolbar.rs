@@ -147,8 +147,9 @@ fn overlays(ui: &mut Ui, view: &mut View, has_sensor: bool) {
          exposure (orange) (M)",
     );
     ui.toggle_value(&mut over.rows, "row times").with_tooltip("mid-exposure of each row, after the stamp");
-    ui.toggle_value(&mut over.error, "predicted error")
-        .with_tooltip("predicted source error at the planner's probes: bright is large");
+    ui.toggle_value(&mut over.error, "predicted error").with_tooltip(
+        "predicted source error at the planner's probes: bright is large, red is above the frame's bound",
+    );
     ui.toggle_value(&mut over.depth, "depth").with_tooltip("planar depth instead of colour: near is bright");
     if has_sensor {
         ui.toggle_value(&mut over.raw, "raw")

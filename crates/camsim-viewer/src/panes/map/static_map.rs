@@ -8,7 +8,7 @@ use std::{
 use camsim_core::{
     camera::CameraModel,
     flight_log::FlightLog,
-    scene::{Mesh, Scene, Terrain},
+    scene::{Aabb, Mesh, RigidMotion, Scene, Terrain},
     sequence::Sequence,
     trajectory::Trajectory,
 };
@@ -50,6 +50,7 @@ pub struct StaticMap {
     pub flats: Arc<Vec<[DVec3; 4]>>,
     /// Bounding boxes of meshes of models, NED: least and largest coordinates.
     pub boxes: Arc<Vec<[DVec3; 2]>>,
+    movers: Arc<Vec<Mover>>,
 }
 
 /// What the map depends on; not the camera, so that dragging its parameters keeps the map.
@@ -100,9 +101,11 @@ pub fn static_map(ui: &Ui, loaded: &Loaded) -> StaticMap {
     let footprints = CameraModel::from_spec(&sequence.scenario.camera)
         .map_or_else(|_| Vec::new(), |camera| footprint_points(sequence, &camera));
     let (flats, boxes) = objects(&sequence.scene);
+    let movers = movers(&sequence.scene);
     let from_above = |corners: &[DVec3; 2]| corners.map(DVec3::truncate);
-    let moving_rects =
-        moving(&sequence.scene, sequence.start_s).into_iter().map(|thing| from_above(&thing.corners));
+    let moving_rects = moving(&sequence.scene, &movers, sequence.start_s)
+        .into_iter()
+        .map(|thing| from_above(&thing.corners));
     let bounds = bounds(
         track.iter().map(|(ned, _)| ned.truncate()).chain(footprints),
         flats.iter().map(bounding_rect).chain(boxes.iter().map(from_above)).chain(moving_rects),
@@ -119,6 +122,7 @@ pub fn static_map(ui: &Ui, loaded: &Loaded) -> StaticMap {
         relief,
         flats: Arc::new(flats),
         boxes: Arc::new(boxes),
+        movers: Arc::new(movers),
     };
     ui.data_mut(|data| data.insert_temp(id, map.clone()));
     map
@@ -151,7 +155,7 @@ fn objects(scene: &Scene) -> (Vec<[DVec3; 4]>, Vec<[DVec3; 2]>) {
 
 /// An object that moves, at one instant.
 pub struct MovingThing {
-    /// Name of the object; "unnamed" for meshes that belong to none.
+    /// Name of the object.
     pub name: String,
     /// Least and largest coordinates, NED metres.
     pub corners: [DVec3; 2],
@@ -164,23 +168,35 @@ impl MovingThing {
     }
 }
 
+/// A mesh that moves, with its object's number and its box at path time 0.
+type Mover = (u32, Arc<RigidMotion>, Aabb);
+
+fn movers(scene: &Scene) -> Vec<Mover> {
+    let mover = |mesh: &Mesh| Some((mesh.object, mesh.motion.clone()?, mesh.bounds()));
+    scene.meshes.iter().filter_map(mover).filter(|(.., bounds)| !bounds.is_empty()).collect()
+}
+
 /// The objects that move, where they are at a path time; at most [`MAX_BOXES`].
-pub fn moving(scene: &Scene, t_s: f64) -> Vec<MovingThing> {
+fn moving(scene: &Scene, movers: &[Mover], t_s: f64) -> Vec<MovingThing> {
     let mut corners: BTreeMap<u32, [DVec3; 2]> = BTreeMap::new();
-    for mesh in &scene.meshes {
-        let Some(bounds) = mesh.motion.as_ref().map(|motion| motion.bounds(&mesh.bounds(), t_s, t_s)) else {
-            continue;
-        };
-        if !bounds.is_empty() {
-            let hull = corners.entry(mesh.object).or_insert([bounds.min, bounds.max]);
-            *hull = [hull[0].min(bounds.min), hull[1].max(bounds.max)];
-        }
+    for (object, motion, bounds) in movers {
+        let bounds = motion.bounds(bounds, t_s, t_s);
+        let hull = corners.entry(*object).or_insert([bounds.min, bounds.max]);
+        *hull = [hull[0].min(bounds.min), hull[1].max(bounds.max)];
     }
-    let named = corners.into_iter().take(MAX_BOXES).map(|(object, corners)| {
-        let known = object.checked_sub(1).and_then(|index| scene.objects.get(index as usize));
-        MovingThing { name: known.map_or("unnamed", |object| object.name.as_str()).to_owned(), corners }
+    let named = corners.into_iter().take(MAX_BOXES).map(|(number, corners)| {
+        let object = number.checked_sub(1).and_then(|index| scene.objects.get(index as usize));
+        let name = object.map(|object| object.name.clone()).filter(|name| !name.is_empty());
+        MovingThing { name: name.unwrap_or_else(|| format!("object {number}")), corners }
     });
     named.collect()
+}
+
+impl StaticMap {
+    /// The objects that move, where they are at a path time; at most [`MAX_BOXES`].
+    pub fn moving(&self, scene: &Scene, t_s: f64) -> Vec<MovingThing> {
+        moving(scene, &self.movers, t_s)
+    }
 }
 
 /// Meshes of patterns and boards, whose vertices are row-major corners.
