@@ -1,6 +1,6 @@
 """Pairs for learning: a rolling shutter, a global one at the same instant, and the displacement between them.
 
-python rolling_pair.py [SCENARIO.toml]: ten pairs of it, or of the built-in flight, into pairs/
+python rolling_pair.py [SCENARIO.toml]: ten pairs of it, or of the built-in flight, into out/pairs/
 """
 
 import pathlib
@@ -10,7 +10,7 @@ import numpy as np
 
 import camsim
 
-folder, count = pathlib.Path("pairs"), 10
+folder, count = pathlib.Path("out/pairs"), 10
 scenario = camsim.Scenario.load(sys.argv[1]) if sys.argv[1:] else camsim.Scenario.demo()
 rolling = scenario.replace({"camera.shutter.exposure_ms": 0})
 sharp = rolling.replace({"camera.shutter.readout_ms": 0})

@@ -31,6 +31,9 @@ class Samples:
         names = channel_names(channels)
         self.source = source
         base = source.scenario if isinstance(source, Variations) else source
+        if names is not None:
+            # Refuses names that are no channels here, and not in a worker.
+            base.replace({"output.channels": names})
         self.channels = base.channels if names is None else names
         self._held: tuple[int, Scenario] | None = None
         if isinstance(source, Variations):

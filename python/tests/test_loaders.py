@@ -49,6 +49,13 @@ def rendered() -> list[dict[str, Any]]:
     return samples
 
 
+def test_a_wrong_channel_is_refused_before_the_first_sample(pattern: pathlib.Path) -> None:
+    from camsim._samples import Samples
+
+    with pytest.raises(camsim.InputError, match="colour"):
+        Samples(camsim.Scenario.load(pattern), ["colour"], None)
+
+
 @pytest.mark.parametrize("context", ["fork", "spawn"])
 def test_two_workers_give_the_bytes_of_one_process(
     context: str, pattern: pathlib.Path, rendered: list[dict[str, Any]]

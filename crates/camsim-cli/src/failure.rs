@@ -55,6 +55,14 @@ impl Failure {
         Self { code: self.code, error: self.error.context(text) }
     }
 
+    /// With advice at the end of the message.
+    #[cfg(feature = "lab")]
+    #[must_use]
+    pub fn with_advice(self, advice: &str) -> Self {
+        let text = format!("{}{advice}", self.error);
+        Self { code: self.code, error: self.error.context(text) }
+    }
+
     /// The exit code.
     #[must_use]
     pub fn code(&self) -> u8 {

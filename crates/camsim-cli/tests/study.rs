@@ -187,6 +187,7 @@ fn a_wrong_study_is_refused_before_anything_is_rendered() {
         ("[[vary]]\nkey = \"camera.nonsense\"\nvalues = [1]\n", "camera.nonsense = 1"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = [10, -1]\n", "camera.fps = -1"),
         ("[[vary]]\nkey = \"camera.fps\"\nvalues = []\n", "no values"),
+        ("[[vary]]\nkey = \"camera.lens.model\"\nvalues = [\"eucm\"]\n", "[[point]] instead of [[vary]]"),
         ("export = \"eurok\"\n[[vary]]\nkey = \"camera.fps\"\nvalues = [10]\n", "is not a layout"),
         (
             "[[vary]]\nkey = \"camera.fps\"\nvalues = [10]\n[[vary]]\nkey = \"camera.fps\"\nvalues = [20]\n",

@@ -275,7 +275,12 @@ impl Runner<'_> {
                 return Err(Failure::bad_input(anyhow!("two points are the same: {}", point.label())));
             }
             let read = read_changed(&self.scenario(), &self.changes(&point), console);
-            let read = read.map_err(|failure| failure.of(point.label()))?;
+            // Values of one key may need values of another one.
+            let advice = match study.vary.is_empty() {
+                true => "",
+                false => "; for keys that change together, list points with [[point]] instead of [[vary]]",
+            };
+            let read = read.map_err(|failure| failure.of(point.label()).with_advice(advice))?;
             if read.is_random() {
                 return Err(Failure::bad_input(anyhow!(
                     "{} has [randomize], whose values a study would not know: remove it, and name the values in \

@@ -6,22 +6,16 @@ use eframe::egui::{Rect, pos2};
 use egui_kittest::kittest::Queryable;
 use toml::Value;
 
-use super::harness::{Window, has, pattern, send, shown_request};
+use super::harness::{Window, has, pattern, pattern_with, send, shown_request};
 use crate::message::Message;
 
 /// Two cameras over the pattern: the second has other optics, and a third of the rate.
 fn pair(folder: &Path) -> PathBuf {
-    camsim_io::builtin::unpack(folder).expect("unpacked");
-    let text = std::fs::read_to_string(folder.join("pattern.toml")).expect("text");
-    let (head, tail) =
-        (&text[..text.find("[camera]").expect("a camera")], &text[text.find("[scene]").expect("a scene")..]);
     let cameras = "[[cameras]]\nname = \"left\"\nsize_px = [160, 120]\nfocal_px = [100.0, 100.0]\n\
         mount = { angles_deg = [0.0, -90.0, 0.0] }\n\
         [[cameras]]\nname = \"right\"\nsize_px = [120, 120]\nfocal_px = [60.0, 60.0]\nfps = 10.0\nphase = 0.2\n\
         mount = { angles_deg = [0.0, -90.0, 0.0], offset_m = [0.0, 1.0, 0.0] }\n";
-    let path = folder.join("pair.toml");
-    std::fs::write(&path, format!("{head}{cameras}{tail}")).expect("written");
-    path
+    pattern_with(folder, cameras)
 }
 
 #[test]

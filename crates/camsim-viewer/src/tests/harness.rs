@@ -2,7 +2,10 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::mpsc::{Receiver, channel},
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
     time::{Duration, Instant},
 };
 
@@ -16,7 +19,7 @@ use egui_kittest::{
 use crate::{
     app::Viewer,
     display_image,
-    engine::{FrameRequest, Size},
+    engine::{Difference, FrameRequest, Size},
     export::Exporter,
     settings::Settings,
     state::State,
@@ -33,6 +36,16 @@ pub fn demo() -> PathBuf {
 /// A flat scene with every effect, quick to render.
 pub fn pattern() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml")
+}
+
+/// [`pattern`] with other cameras, given as their tables, in `folder`.
+pub fn pattern_with(folder: &Path, cameras: &str) -> PathBuf {
+    camsim_io::builtin::unpack(folder).expect("unpacked");
+    let text = std::fs::read_to_string(folder.join("pattern.toml")).expect("text");
+    let [head, tail] = ["[camera]", "[scene]"].map(|table| text.find(table).expect("a table"));
+    let path = folder.join("cameras.toml");
+    std::fs::write(&path, format!("{}{cameras}{}", &text[..head], &text[tail..])).expect("written");
+    path
 }
 
 /// Ten hours of circles over the scene of [`pattern`], one row per second with a gap of a minute, in
@@ -178,6 +191,22 @@ impl Window {
     pub fn settle_reference(&mut self) {
         self.settle();
         self.wait("the reference", |state| state.engine.current_reference().is_some());
+    }
+
+    /// Shows the difference of the picture from the reference's, and waits for all rows.
+    #[track_caller]
+    pub fn difference_from_reference(&mut self) -> Arc<Difference> {
+        self.settle();
+        self.click("difference");
+        self.click("B: reference");
+        self.settle();
+        self.wait("all rows", |state| {
+            state.engine.current_reference_picture().is_some_and(|shown| {
+                let [_, height] = shown.picture.sequence.scenario.camera.size_px;
+                shown.picture.rows == height && shown.picture.difference.is_some()
+            })
+        });
+        self.state().engine.difference(true).expect("a difference").0.clone()
     }
 
     #[track_caller]

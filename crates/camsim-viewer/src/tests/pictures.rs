@@ -211,17 +211,7 @@ fn has_errors(state: &State) -> bool {
 fn the_reference_picture_agrees_with_the_rendered_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::open(Some(small(folder.path())));
-    window.settle();
-    window.click("difference");
-    window.click("B: reference");
-    window.settle();
-    window.wait("all rows", |state| {
-        state
-            .engine
-            .current_reference_picture()
-            .is_some_and(|reference| reference.picture.rows == 24 && reference.picture.difference.is_some())
-    });
-    let (difference, _) = window.state().engine.difference(true).expect("a difference");
+    let difference = window.difference_from_reference();
     let predicted_dn = window.state().engine.picture().expect("a picture").plan.predicted.picture_dn();
     // The reference's pixels have a standard error of a quarter of max_error_dn, which is 1.
     assert!(

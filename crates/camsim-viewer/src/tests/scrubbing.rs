@@ -3,7 +3,7 @@
 use eframe::egui::{self, Key, PointerButton};
 use egui_kittest::kittest::Queryable;
 
-use super::harness::{Window, demo, pattern, send, shown_request};
+use super::harness::{Window, demo, pattern, pattern_with, send, shown_request};
 use crate::{engine::Size, message::Message, state::State, view::Compare};
 
 #[test]
@@ -199,9 +199,9 @@ fn a_late_full_frame_does_not_replace_the_preview_of_the_wanted_one() {
 fn a_picture_that_is_not_the_wanted_one_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     // Large, so that a full frame takes longer than the mark waits.
-    let camera = "size_px = [2400, 1800]\nfocal_px = [1600.0, 1600.0]\n\
+    let camera = "[camera]\nsize_px = [2400, 1800]\nfocal_px = [1600.0, 1600.0]\n\
         mount = { angles_deg = [0.0, -90.0, 0.0] }\nshutter = { exposure_ms = 8.0 }\n";
-    let mut window = Window::open(Some(super::wide::with_camera(folder.path(), camera)));
+    let mut window = Window::open(Some(pattern_with(folder.path(), camera)));
     window.settle();
     send(&mut window, Message::Seek(30));
     let mark = "rendering frame 30";

@@ -2,14 +2,11 @@
 
 use egui_kittest::kittest::Queryable;
 
-use super::{
-    harness::{Window, has, send},
-    wide::with_camera,
-};
+use super::harness::{Window, has, pattern_with, send};
 use crate::message::Message;
 
 /// A small camera with a Bayer mosaic.
-const BAYER: &str = "size_px = [48, 36]\nfocal_px = [42.0, 42.0]\nmount = { angles_deg = [0.0, -90.0, 0.0] }\n\
+const BAYER: &str = "[camera]\nsize_px = [48, 36]\nfocal_px = [42.0, 42.0]\nmount = { angles_deg = [0.0, -90.0, 0.0] }\n\
     sensor = { mosaic = \"rggb\", black_dn = 16.0, white_e = 4000.0, full_well_e = 8000.0, bits = 12 }\n\
     shutter = { exposure_ms = 4.0 }\n";
 
@@ -17,18 +14,8 @@ const BAYER: &str = "size_px = [48, 36]\nfocal_px = [42.0, 42.0]\nmount = { angl
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn reference_of_a_mosaic_is_developed_as_a_whole() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut window = Window::open(Some(with_camera(folder.path(), BAYER)));
-    window.settle();
-    window.click("difference");
-    window.click("B: reference");
-    window.settle();
-    window.wait("all rows", |state| {
-        state
-            .engine
-            .current_reference_picture()
-            .is_some_and(|reference| reference.picture.rows == 36 && reference.picture.difference.is_some())
-    });
-    let (difference, _) = window.state().engine.difference(true).expect("a difference");
+    let mut window = Window::open(Some(pattern_with(folder.path(), BAYER)));
+    let difference = window.difference_from_reference();
     // Both have the same noise; strips of rows that are developed alone differ by 14.
     assert!(difference.rms_dn < 3.0, "{}", difference.rms_dn);
 }
@@ -37,7 +24,7 @@ fn reference_of_a_mosaic_is_developed_as_a_whole() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn raw_picture_and_its_numbers_are_shown() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut window = Window::open(Some(with_camera(folder.path(), BAYER)));
+    let mut window = Window::open(Some(pattern_with(folder.path(), BAYER)));
     window.settle();
     window.click("raw");
     window.click("histogram");

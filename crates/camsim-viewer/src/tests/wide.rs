@@ -6,7 +6,7 @@ use camsim_core::camera::CameraModel;
 use eframe::egui;
 use egui_kittest::kittest::Queryable;
 
-use super::harness::{Window, has, pattern, send};
+use super::harness::{Window, has, pattern_with, send};
 use crate::{
     engine::Stage,
     message::Message,
@@ -16,27 +16,14 @@ use crate::{
 /// Side of the picture, pixels.
 const SIDE: u32 = 64;
 
-/// [`pattern`] by an equidistant fisheye of 200 degrees across, which looks forwards.
-pub fn fisheye(folder: &Path) -> PathBuf {
-    with_camera(
-        folder,
-        &format!(
-            "size_px = [{SIDE}, {SIDE}]\nfocal_px = [18.335, 18.335]\nlens = {{ model = \"kannala-brandt\" }}\n\
-         shutter = {{ readout_ms = 20.0 }}\nimage_circle = {{ half_angle_deg = 100.0 }}\n"
-        ),
-    )
-}
-
-/// [`pattern`] with another camera.
-pub fn with_camera(folder: &Path, camera: &str) -> PathBuf {
-    camsim_io::builtin::unpack(folder).expect("unpacked");
-    let text = std::fs::read_to_string(folder.join("pattern.toml")).expect("text");
-    let (head, tail) =
-        (&text[..text.find("[camera]").expect("a camera")], &text[text.find("[scene]").expect("a scene")..]);
-    let path = folder.join("camera.toml");
-    std::fs::write(&path, format!("{head}[camera]\n{camera}{tail}")).expect("written");
-    assert!(pattern().exists());
-    path
+/// An equidistant fisheye of 200 degrees across, which looks forwards.
+fn fisheye(folder: &Path) -> PathBuf {
+    let camera = format!(
+        "[camera]\nsize_px = [{SIDE}, {SIDE}]\nfocal_px = [18.335, 18.335]\n\
+         lens = {{ model = \"kannala-brandt\" }}\nshutter = {{ readout_ms = 20.0 }}\n\
+         image_circle = {{ half_angle_deg = 100.0 }}\n"
+    );
+    pattern_with(folder, &camera)
 }
 
 #[test]
@@ -74,17 +61,7 @@ fn pixel_page_has_rays_beyond_90_degrees() {
 fn reference_covers_the_whole_picture() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::open(Some(fisheye(folder.path())));
-    window.settle();
-    window.click("difference");
-    window.click("B: reference");
-    window.settle();
-    window.wait("all rows", |state| {
-        state
-            .engine
-            .current_reference_picture()
-            .is_some_and(|reference| reference.picture.rows == SIDE && reference.picture.difference.is_some())
-    });
-    let (difference, _) = window.state().engine.difference(true).expect("a difference");
+    let difference = window.difference_from_reference();
     assert_eq!(difference.one_sided, 0.0, "the same pixels are valid");
     // At borders of cells, of which this picture has many, a coarse picture differs more.
     let plans = window.state().engine.picture().expect("a picture").plans();

@@ -19,7 +19,7 @@ use crate::columns::{Column, T_S, T_TRUE_NS, TableRow};
 use crate::formats::axes::Rigid;
 use crate::formats::writing::{Calibration, Intrinsics};
 use crate::manifest::RunManifest;
-use crate::write::{FRAMES_CSV, FrameRecord, TRAJECTORY_CSV};
+use crate::write::{FRAMES_CSV, FrameRecord, TRAJECTORY_CSV, VARIATIONS_CSV};
 use crate::write::{RIG_TOML, rig_names};
 
 /// An output folder.
@@ -184,7 +184,12 @@ fn read_run(folder: &Path) -> Result<Value, DatasetError> {
     let path = folder.join("run.json");
     let fail = |message: String| DatasetError::Input { path: path.clone(), message };
     let text = std::fs::read_to_string(&path).map_err(|error| {
-        fail(format!("cannot be read: {error}; name a folder that camsim render has made"))
+        let advice = if folder.join(VARIATIONS_CSV).is_file() {
+            "the folder has variations: name one of them, such as variation_000000"
+        } else {
+            "name a folder that camsim render has made"
+        };
+        fail(format!("cannot be read: {error}; {advice}"))
     })?;
     serde_json::from_str(&text).map_err(|error| fail(format!("is no run.json of camsim: {error}")))
 }

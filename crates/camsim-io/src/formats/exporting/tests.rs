@@ -14,7 +14,7 @@ use std::{fs, path::Path};
 use camsim_core::scenario::{Channel, DatasetFormat, Scenario};
 
 use super::*;
-use crate::scenario_file::parse_scenario;
+use crate::{scenario_file::parse_scenario, write::VARIATIONS_CSV};
 use sample::Sample;
 
 /// Exports all frames without a stop.
@@ -117,6 +117,10 @@ fn what_is_missing_is_one_error_with_its_key() {
     assert!(text.contains("\"png\" to output.format") && text.contains("frame 4 is the first"), "{text}");
     let text = RunFolder::open(&sample.out()).unwrap_err().to_string();
     assert!(text.contains("run.json") && text.contains("camsim render"), "{text}");
+    fs::create_dir_all(sample.out()).unwrap();
+    fs::write(sample.out().join(VARIATIONS_CSV), "").unwrap();
+    let text = RunFolder::open(&sample.out()).unwrap_err().to_string();
+    assert!(text.contains("has variations"), "{text}");
 }
 
 #[test]
