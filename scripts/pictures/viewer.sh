@@ -37,7 +37,7 @@ picture() {
         *) xdotool $step ;;
         esac
     done
-    import -window root -strip -colors 255 -define png:compression-level=9 "$repository/docs/viewer/$name.png"
+    import -window root -strip +dither -colors 255 -define png:compression-level=9 "PNG8:$repository/docs/viewer/$name.png"
     kill "$viewer"
     wait "$viewer" 2>/dev/null || true
     viewer=
