@@ -94,11 +94,14 @@ impl CameraReference {
         self.parts[0].sequence().scenario.camera.face.is_some()
     }
 
-    /// The frame that all parts have made, with the stages that take whole frames.
+    /// The frame that all parts have made, with the stages that take whole frames. A renderer of undivided frames
+    /// has applied them itself.
     #[must_use]
     pub fn joined(&self, parts: impl IntoIterator<Item = Finished>) -> Option<Finished> {
         let mut whole = join_parts(parts)?;
-        self.expose(&mut whole.frame);
+        if self.parts.len() > 1 {
+            self.expose(&mut whole.frame);
+        }
         Some(whole)
     }
 
