@@ -14,7 +14,7 @@ use super::picture::Picture;
 pub const BARS: usize = 256;
 
 /// Counts of values by colour.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Counts of red, green, blue and white (luminance); white is of sensors that have such pixels.
     pub counts: [Vec<u64>; 4],
@@ -46,10 +46,14 @@ impl RawScale {
     }
 
     /// Colours of the numbers of a pixel: 0, 1, 2 are red, green, blue, 3 is white.
-    pub fn colors(&self, pixel: [u32; 2]) -> Vec<usize> {
+    pub fn colors(&self, pixel: [u32; 2]) -> &'static [usize] {
+        const ALL: &[usize] = &[0, 1, 2, 3];
         match self.mosaic {
-            Mosaic::None => vec![0, 1, 2],
-            mosaic => vec![usize::from(color_at(mosaic, pixel))],
+            Mosaic::None => &ALL[..3],
+            mosaic => {
+                let color = usize::from(color_at(mosaic, pixel));
+                &ALL[color..=color]
+            }
         }
     }
 
@@ -88,8 +92,8 @@ pub fn raw_image(picture: &Picture) -> Option<ColorImage> {
     let shown = |code: u16| codes.get(usize::from(code)).copied().unwrap_or(u8::MAX);
     let pixels = pixels(raw, size_px).map(|(pixel, numbers)| {
         let mut rgb = [0; 3];
-        for (color, number) in scale.colors(pixel).into_iter().zip(numbers) {
-            match rgb.get_mut(color) {
+        for (color, number) in scale.colors(pixel).iter().zip(numbers) {
+            match rgb.get_mut(*color) {
                 Some(value) => *value = shown(*number),
                 None => rgb = [shown(*number); 3],
             }
@@ -111,11 +115,8 @@ fn raw_histogram(raw: &RawPicture, size_px: [u32; 2], scale: &RawScale) -> Histo
     let end = 1 << raw.bits;
     let mut histogram = Histogram::empty(end, true);
     for (pixel, numbers) in pixels(raw, size_px) {
-        let colors = scale.colors(pixel);
-        colors
-            .into_iter()
-            .zip(numbers)
-            .for_each(|(color, number)| histogram.count(color, u32::from(*number)));
+        let numbers = scale.colors(pixel).iter().zip(numbers);
+        numbers.for_each(|(color, number)| histogram.count(*color, u32::from(*number)));
     }
     histogram.finished()
 }

@@ -99,8 +99,8 @@ fn raw_facts(ui: &mut Ui, picture: &StagePicture<'_>, [x, y]: [u32; 2]) {
     let channels = raw.channels as usize;
     let first = channels * (y as usize * picture.size_px[0] as usize + x as usize);
     let Some(numbers) = raw.values.get(first..first + channels) else { return };
-    for (color, number) in scale.colors([x, y]).into_iter().zip(numbers) {
-        let color = [", red", ", green", ", blue", ", white"].get(color).copied().unwrap_or_default();
+    for (color, number) in scale.colors([x, y]).iter().zip(numbers) {
+        let color = [", red", ", green", ", blue", ", white"].get(*color).copied().unwrap_or_default();
         let color = if scale.is_mono() { "" } else { color };
         let electrons = scale.electrons(*number);
         let electrons = electrons.map_or_else(|| ", companded".to_owned(), |e| format!(", {e:.1} electrons"));
