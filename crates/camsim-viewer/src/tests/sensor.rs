@@ -16,8 +16,8 @@ fn reference_of_a_mosaic_is_developed_as_a_whole() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::open(Some(pattern_with(folder.path(), BAYER)));
     let difference = window.difference_from_reference();
-    // Both have the same noise; strips of rows that are developed alone differ by 14.
-    assert!(difference.rms_dn < 3.0, "{}", difference.rms_dn);
+    // 0.45: both have the same noise. Strips of rows that are developed alone lose their borders.
+    assert!(difference.rms_dn < 1.0, "{}", difference.rms_dn);
 }
 
 #[test]
